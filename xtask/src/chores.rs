@@ -133,15 +133,15 @@ pub(crate) fn gap_bench(arguments: &[String]) -> Result<(), String> {
     call(command.args(["bench", "--squirrel"]).arg(built.join("squirrel")).args(arguments))
 }
 
-/// `cargo xtask attack`: tests of what reads logs, vehicles, scenarios, weights and plans, on more
-/// files than in `cargo xtask test`.
+/// `cargo xtask attack`: tests of what reads logs, vehicles, scenarios, weights, plans, wire records,
+/// checkpoints and journals, on more files than in `cargo xtask test`.
 pub(crate) fn attack(arguments: &[String]) -> Result<(), String> {
     let [count, seed] = count_and_seed(arguments, ["2500", "1"])?;
-    for (package, test) in [("squirrel-log", "attack"), ("squirrel-sim", "attack")] {
+    for package in ["squirrel-log", "squirrel-sim", "squirrel-nn", "squirrel-study"] {
         call(
             cargo()?
                 .args(["test", "--release", "--locked", "-p", package])
-                .args(["--test", "it", test, "--", "--nocapture"])
+                .args(["--test", "it", "attack", "--", "--nocapture"])
                 .env("SQUIRREL_ATTACK_COUNT", &count)
                 .env("SQUIRREL_ATTACK_SEED", &seed),
         )?;

@@ -60,11 +60,7 @@ pub(crate) fn error(problem: &str) {
 /// A text in which names from files do nothing to a terminal: control characters, and those that
 /// turn the direction of writing, are spelt out.
 fn plain(text: &str) -> Cow<'_, str> {
-    let acts = |c: char| {
-        (c.is_control() && c != '\n' && c != '\t')
-            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
-    files::spelt_out(text, acts)
+    files::spelt_out(text, |c| files::acts(c) && c != '\n' && c != '\t')
 }
 
 /// A progress bar on stderr; silent where nobody looks.

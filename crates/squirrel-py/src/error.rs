@@ -20,10 +20,10 @@ pub(crate) fn system(kind: io::ErrorKind, line: impl ToString) -> PyErr {
     io::Error::new(kind, one_line(&line.to_string())).into()
 }
 
-/// Line breaks and other control characters of a name or a file spelt out, as Python's `repr` does:
-/// an error stays one line, and does nothing to a terminal.
+/// Line breaks and whatever else of a name or a file acts on a terminal spelt out, nearly as Python's
+/// `repr` does: an error stays one line.
 fn one_line(text: &str) -> String {
-    files::spelt_out(text, char::is_control).into_owned()
+    files::spelt_out(text, files::acts).into_owned()
 }
 
 /// Of a vehicle file.

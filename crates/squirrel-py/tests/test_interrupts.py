@@ -76,6 +76,19 @@ def test_loops_look_every_so_many_turns(vehicle: squirrel.Vehicle) -> None:
         assert looks(call) >= work // at_most - 1 > 0, name
 
 
+def test_who_waits_for_another_thread_looks_meanwhile(vehicle: squirrel.Vehicle, flights: dict[str, squirrel.FlightLog]) -> None:
+    """Each takes more than the time between two looks on any machine."""
+    calls: dict[str, Callable[[], object]] = {
+        "gap.find": lambda: squirrel.gap.find(vehicle=vehicle, flights=flights),
+        "gap.name": lambda: squirrel.gap.name(vehicle=vehicle, flights=flights),
+        "gap.check": lambda: squirrel.gap.check(vehicle=vehicle, flights=flights),
+        "gap.run": lambda: squirrel.gap.run(vehicle=vehicle, flights=flights),
+        "train": lambda: squirrel.nn.train(flights, epochs=20),
+    }
+    for name, call in calls.items():
+        assert looks(call) > 0, name
+
+
 ENDLESS: dict[str, Callable[[squirrel.Vehicle], object]] = {
     "Batch.step": lambda v: squirrel.Batch(vehicles=[v]).step(10**15),
     "Batch.fly": lambda v: squirrel.Batch(vehicles=[v]).fly(np.zeros((1, 4), np.float32), 10**15),

@@ -284,7 +284,7 @@ def complaint(case: Case, name: str, value: Any, usual: str | None) -> str | Non
         if isinstance(error, (LookupError, OSError)) and not isinstance(error, ValueError):
             return None if name in LOOKUPS else f"{shown()}: {type(error).__name__} {said:.200}"
         # What is in a file is named by the file, line breaks in its name spelt out.
-        file = [str(value).replace("\n", "\\n")] if name in ("path", "map") else []
+        file = [str(value).replace("\n", "\\n").replace("\u202e", r"\u{202e}")] if name in ("path", "map") else []
         if any(word in said for word in (name, *BETTER.get(name, []), *file)):
             return None
         return f"{shown()}: does not name it: {type(error).__name__} {said:.200}"
@@ -454,6 +454,10 @@ def test_an_error_is_one_line_whatever_is_given() -> None:
         lambda name: squirrel.envs.SquirrelEnv(task="avoid", render_mode=name),
     ]
     for call in calls:
-        with pytest.raises(ValueError, match=r" = a\\nb: ") as error:
-            call("a\nb")
-        assert "\n" not in str(error.value)
+        with pytest.raises(ValueError, match=r" = a\\nb\\u\{202e\}: ") as error:
+            call("a\nb\u202e")
+        assert "\n" not in str(error.value) and "\u202e" not in str(error.value)
+    for read in (squirrel.Vehicle.load, squirrel.read_log, squirrel.Policy.load, squirrel.nn.load):
+        with pytest.raises(OSError, match=r"\\u\{1b\}\[2J\\u\{2066\}") as gone:
+            read("no/\x1b[2J\u2066such")
+        assert str(gone.value).isprintable()

@@ -1,6 +1,8 @@
 """Everything public is pickled and copied, and flies on alike, bit for bit."""
 
 import copy
+import dataclasses
+import inspect
 import pickle
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -303,6 +305,37 @@ def test_objects_go_to_another_process_and_back(vehicle: squirrel.Vehicle) -> No
     same(fly(there, 57, 20), fly(here, 57, 20))
     for channel in wanted:
         np.testing.assert_array_equal(log[channel], wanted[channel])
+
+
+RESULTS = [
+    class_
+    for module in (squirrel.gap, squirrel.plan)
+    for class_ in (getattr(module, name) for name in module.__all__)
+    if dataclasses.is_dataclass(class_)
+]
+
+
+@pytest.mark.parametrize("class_", RESULTS)
+def test_what_calls_return(class_: type, vehicle: squirrel.Vehicle) -> None:
+    # Nobody checks what a result holds.
+    held = {field.name: (k, vehicle, [float(k)]) for k, field in enumerate(dataclasses.fields(class_))}
+    thing = class_(**held)
+    for way in WAYS:
+        again = way(thing)
+        assert type(again) is class_ and vars(again) == held
+
+
+def test_no_public_class_is_left_out() -> None:
+    """Of those above; who adds a class adds its test."""
+    modules = [squirrel, squirrel.control, squirrel.dynamics, squirrel.envs, squirrel.gap, squirrel.nn, squirrel.plan, squirrel.policy]
+    public = {
+        thing.__name__
+        for module in modules
+        for thing in (getattr(module, name) for name in module.__all__)
+        if inspect.isclass(thing) and thing not in RESULTS
+    }
+    tested = {"Vehicle", "FlightLog", "Policy", "Model", "Batch", "Stack", "Backstepping", "Twcc", "Tasks", "SquirrelEnv", "SquirrelVectorEnv"}
+    assert public == tested and len(RESULTS) > 10
 
 
 @pytest.mark.parametrize("class_", ["Vehicle", "FlightLog", "Policy", "Model", "Batch", "Stack", "Backstepping", "Twcc", "Tasks", "Other"])

@@ -101,6 +101,8 @@ pub struct Keep<'a> {
     pub part: Part,
     /// The arguments that describe the study, for who merges parts of it.
     pub command: &'a [String],
+    /// The commit of the program, where it is known: what another one flew is not gone on from.
+    pub commit: Option<&'a str>,
     /// Who is told how far it is.
     pub progress: Option<&'a dyn Progress>,
     /// The folder's lock, of who writes more into it than trials; otherwise it is locked while they
@@ -248,7 +250,9 @@ impl<'a> Journal<'a> {
     /// writing into the folder; a part of a study that nobody
     /// keeps.
     pub fn open(keep: &Keep<'a>, name: &str, plan: &str) -> Result<Self, FlightError> {
-        let head = Head { format: FORMAT, plan: plan.to_owned(), command: keep.command.to_vec() };
+        let of_commit = keep.commit.map_or_else(String::new, |commit| format!(", commit {commit}"));
+        let plan = format!("{plan}{of_commit}");
+        let head = Head { format: FORMAT, plan: plan.clone(), command: keep.command.to_vec() };
         let Some(folder) = keep.folder else {
             if keep.part == Part::All {
                 return Ok(Self { keep: *keep, file: None, head, done: Lines::new(), _lock: None });

@@ -35,9 +35,12 @@ fn write_log(log: &mut FlightLog, path: &Path) -> Result<(), String> {
     log.write(path).map_err(|e| e.to_string())
 }
 
+/// The commit of the program, where there was git when it was built.
+const COMMIT: Option<&str> = option_env!("SQUIRREL_COMMIT");
+
 /// Metadata: the commit of the program.
 fn commit() -> (String, String) {
-    ("git".to_owned(), option_env!("SQUIRREL_COMMIT").unwrap_or("unknown").to_owned())
+    ("git".to_owned(), COMMIT.unwrap_or("unknown").to_owned())
 }
 
 /// The table columns that every flight has: name with unit, and the figure.

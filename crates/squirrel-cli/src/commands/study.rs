@@ -3,7 +3,7 @@
 
 mod merge;
 
-use super::vehicle;
+use super::{COMMIT, vehicle};
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
 use clap::error::ErrorKind;
@@ -202,7 +202,14 @@ impl Flown {
         for trials in rounds {
             plan.trials = trials;
             let command = self.command(&plan, &own);
-            let keep = Keep { folder, part, command: &command, progress: Some(&bar), lock };
+            let keep = Keep {
+                folder,
+                part,
+                command: &command,
+                commit: COMMIT,
+                progress: Some(&bar),
+                lock,
+            };
             found = (self.study.fly)(&plan, &own, &keep);
             let (Some(until), Ok(Some(now))) = (self.common.until, &found) else { break };
             let (is_met, widest) = until.is_met(&now.json).map_err(|e| e.to_string())?;

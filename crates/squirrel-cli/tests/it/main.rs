@@ -2,6 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod crash;
+mod crowd;
+mod disk;
 mod export_vectors;
 mod gap;
 mod overwrite;

@@ -54,12 +54,22 @@ impl Budget {
         Self { most, left: most }
     }
 
+    /// What is left, bytes.
+    pub fn left(&self) -> u64 {
+        self.left
+    }
+
+    /// What is said of more than that.
+    pub fn too_large(&self) -> TooLarge {
+        TooLarge { most: self.most }
+    }
+
     /// Takes memory that something of the file is about to need.
     ///
     /// # Errors
     /// There is not so much left.
     pub fn take(&mut self, bytes: u64) -> Result<(), TooLarge> {
-        self.left = self.left.checked_sub(bytes).ok_or(TooLarge { most: self.most })?;
+        self.left = self.left.checked_sub(bytes).ok_or_else(|| self.too_large())?;
         Ok(())
     }
 

@@ -12,7 +12,7 @@ mod write;
 
 pub use budget::{Budget, TooLarge};
 pub use lock::Lock;
-pub use names::spelt_out;
+pub use names::{acts, spelt_out};
 pub use place::FileId;
 pub use read::{begin, open, read, read_text};
 pub use write::{Growing, append, folder, writable, write_whole};

@@ -8,6 +8,7 @@ use super::error::ImportError;
 use super::mat_format::{Array, Arrays};
 use super::meter::Meter;
 use super::table::{Table, TableFile, checked, places};
+use crate::files::Budget;
 
 /// Columns or rows of an array that are columns here.
 const WIDTH_MAX: usize = 1024;
@@ -20,6 +21,7 @@ pub(super) struct MatFile<'a> {
     columns: Vec<String>,
     series: Vec<Series>,
     bytes: usize,
+    budget: Budget,
     meter: &'a Meter<'a>,
 }
 
@@ -42,13 +44,14 @@ impl<'a> MatFile<'a> {
         meter: &'a Meter<'a>,
     ) -> Result<Self, ImportError> {
         let size = bytes.len();
-        let arrays = Arrays::read(bytes)
+        let mut budget = Budget::of(size as u64);
+        let arrays = Arrays::read(bytes, &mut budget)
             .map_err(|problem| ImportError::Damaged { file: file.to_owned(), problem })?;
         let (mut columns, mut series) = (Vec::new(), Vec::new());
         for (index, array) in arrays.all.iter().enumerate() {
             list(index, array, &mut columns, &mut series);
         }
-        Ok(Self { name: file.to_owned(), arrays, columns, series, bytes: size, meter })
+        Ok(Self { name: file.to_owned(), arrays, columns, series, bytes: size, budget, meter })
     }
 }
 
@@ -57,7 +60,7 @@ impl TableFile for MatFile<'_> {
         &self.columns
     }
 
-    fn read(self: Box<Self>, wanted: &[&str]) -> Result<Table, ImportError> {
+    fn read(mut self: Box<Self>, wanted: &[&str]) -> Result<Table, ImportError> {
         let places = places(&self.name, &self.columns, wanted)?;
         let count = places.first().map_or(0, |place| self.series[*place].count);
         let mut values = Vec::with_capacity(wanted.len());
@@ -72,6 +75,10 @@ impl TableFile for MatFile<'_> {
                     ),
                 });
             }
+            // One byte of the file may be a number of eight.
+            self.budget
+                .take_numbers(count)
+                .map_err(|source| ImportError::TooLarge { file: self.name.clone(), source })?;
             let array = &self.arrays.all[series.array];
             let numbers = (0..count).map(|row| {
                 let number = self.arrays.number(array, series.first + row * series.step);

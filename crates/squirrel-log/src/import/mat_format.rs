@@ -7,14 +7,13 @@
 
 use std::ops::Range;
 
-use miniz_oxide::inflate::decompress_to_vec_zlib_with_limit;
+use miniz_oxide::inflate::{TINFLStatus, decompress_to_vec_zlib_with_limit};
 
 use super::number::Kind;
+use crate::files::Budget;
 
 /// Text, an offset that is not used here, version and byte order.
 const HEADER_BYTES: usize = 128;
-/// Bytes that all packed variables together may have: a few hundred bytes can unpack to gigabytes.
-const UNPACKED_MAX_BYTES: usize = 1 << 30;
 /// Deeper nesting than any log has; bounds the recursion.
 const DEPTH_MAX: usize = 32;
 /// Arrays of a file; each element of a list of structures has its own.
@@ -49,13 +48,11 @@ pub(super) struct Arrays {
 impl Arrays {
     /// Finds the arrays of a file.
     ///
+    /// * `budget` - of all packed variables together: a few hundred bytes can unpack to gigabytes
+    ///
     /// # Errors
     /// Says what is wrong, and at which byte.
-    pub(super) fn read(bytes: Vec<u8>) -> Result<Self, String> {
-        Self::read_within(bytes, UNPACKED_MAX_BYTES)
-    }
-
-    fn read_within(bytes: Vec<u8>, mut left: usize) -> Result<Self, String> {
+    pub(super) fn read(bytes: Vec<u8>, budget: &mut Budget) -> Result<Self, String> {
         let version = match bytes.get(124..HEADER_BYTES) {
             Some([0, 1, b'I', b'M']) => false,
             Some([1, 0, b'M', b'I']) => true,
@@ -71,13 +68,16 @@ impl Arrays {
             at = element.end;
             if element.kind == COMPRESSED {
                 let packed = &bytes[element.data.clone()];
-                let unpacked = decompress_to_vec_zlib_with_limit(packed, left).map_err(|error| {
-                    format!(
-                        "the packed variable at byte {} cannot be unpacked to at most {left} bytes: {error}",
-                        element.data.start
-                    )
-                })?;
-                left -= unpacked.len();
+                let most = usize::try_from(budget.left()).unwrap_or(usize::MAX);
+                let unpacked =
+                    decompress_to_vec_zlib_with_limit(packed, most).map_err(|error| {
+                        if error.status == TINFLStatus::HasMoreOutput {
+                            return budget.too_large().to_string();
+                        }
+                        let at = element.data.start;
+                        format!("the packed variable at byte {at} cannot be unpacked: {error}")
+                    })?;
+                budget.take(unpacked.len() as u64).map_err(|error| error.to_string())?;
                 // The file itself is the first buffer.
                 arrays.buffers.push(unpacked);
                 found.push((arrays.buffers.len(), 0));
@@ -274,11 +274,15 @@ mod tests {
 
     #[test]
     fn packed_variables_together_have_a_largest_size() {
-        let packed = || std::fs::read("tests/data/mat/packed.mat").unwrap();
-        let unpacked: usize =
-            Arrays::read(packed()).unwrap().buffers[1..].iter().map(Vec::len).sum();
-        assert!(Arrays::read_within(packed(), unpacked).is_ok());
-        let error = Arrays::read_within(packed(), unpacked - 1).unwrap_err();
-        assert!(error.contains("cannot be unpacked to at most"), "{error}");
+        let packed = std::fs::read("tests/data/mat/packed.mat").unwrap();
+        let whole = Budget::of(packed.len() as u64);
+        let mut left = whole.clone();
+        let arrays = Arrays::read(packed.clone(), &mut left).unwrap();
+        let unpacked: usize = arrays.buffers[1..].iter().map(Vec::len).sum();
+        assert_eq!(whole.left() - left.left(), unpacked as u64);
+        let mut less = whole.clone();
+        less.take(whole.left() - unpacked as u64 + 1).unwrap();
+        let error = Arrays::read(packed, &mut less).unwrap_err();
+        assert!(error.starts_with("its content is larger than 256 MB"), "{error}");
     }
 }

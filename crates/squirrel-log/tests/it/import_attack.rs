@@ -9,6 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use mcap::{Compression, WriteOptions};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use squirrel_log::FlightLog;
@@ -17,7 +18,7 @@ use squirrel_log::import::{
 };
 
 use crate::import_fields::data;
-use crate::import_support::formats::{Cells, parquet_bytes, parquet_split};
+use crate::import_support::formats::{Cells, mcap_by, parquet_bytes, parquet_split};
 use crate::import_support::{OMEGA, one_source};
 use crate::log_attack;
 
@@ -35,7 +36,7 @@ const CHILD_KIB: u64 = (192 + 64) << 10;
 /// Processor time of a thousand files, s: a hang of 5 s shows.
 const CHILD_S: u64 = 5;
 
-const KINDS: [&str; 16] = [
+const KINDS: [&str; 18] = [
     "ulog",
     "ulog-map",
     "ardupilot",
@@ -48,6 +49,8 @@ const KINDS: [&str; 16] = [
     "map-table",
     "mcap",
     "mcap-loose",
+    "json",
+    "json-zstd",
     "bag",
     "protobuf",
     "mat",
@@ -72,6 +75,8 @@ fn good(kind: &str) -> Vec<u8> {
         "mcap" => return own_log(),
         // Its records; see `log_attack`.
         "mcap-loose" => return log_attack::records(&own_log()),
+        "json" => return json(None),
+        "json-zstd" => return json(Some(Compression::Zstd)),
         "bag" => return fs::read(data("ros/ros.mcap")).unwrap(),
         "protobuf" => return fs::read(data("protobuf/flight.mcap")).unwrap(),
         "mat" => return fs::read(data("mat/plain.mat")).unwrap(),
@@ -106,6 +111,18 @@ fn parquet(bytes: impl Fn(&str, &[Cells]) -> Vec<u8>) -> Vec<u8> {
     )
 }
 
+/// Messages in JSON, without the checksums that would tell of a change.
+fn json(compression: Option<Compression>) -> Vec<u8> {
+    let message = |k: u32| {
+        let x = f64::from(k) / 8.0;
+        let text = format!(r#"{{"stamp":{k},"w":{{"x":{x},"yz":[{x},null,"NaN"]}},"up":true}}"#);
+        ("/imu", "json", u64::from(k) * 1000, text)
+    };
+    let options = WriteOptions::new().chunk_size(Some(1500)).compression(compression);
+    let options = options.calculate_chunk_crcs(false).calculate_data_section_crc(false);
+    mcap_by(options, &(0..60).map(message).collect::<Vec<_>>())
+}
+
 /// A flight of a second, as squirrel writes it.
 fn own_log() -> Vec<u8> {
     let mut log = FlightLog::default();
@@ -121,11 +138,20 @@ fn own_log() -> Vec<u8> {
     fs::read(path).unwrap()
 }
 
+/// A refusal says which file or map it is of.
+pub(crate) fn is_placed<T>(read: Result<T, impl std::fmt::Display>, path: &Path) -> Option<T> {
+    read.map_err(|error| {
+        let (error, name) = (error.to_string(), path.file_name().unwrap().to_string_lossy());
+        assert!(error.starts_with("map") || error.contains(&*name), "{name}: {error}");
+    })
+    .ok()
+}
+
 /// Reads a file as its kind is read; what comes out does not matter.
 fn read(kind: &str, path: &Path) {
     let by_map = |map: &str| {
-        if let Ok(map) = ImportMap::parse(map, "map") {
-            let _ = import(&map, &[path.to_path_buf()]);
+        if let Some(map) = is_placed(ImportMap::parse(map, "map"), path) {
+            is_placed(import(&map, &[path.to_path_buf()]), path);
         }
     };
     let topic = |topic: &str, time: &str, unit: &str, columns: &str| {
@@ -136,7 +162,8 @@ fn read(kind: &str, path: &Path) {
     match kind {
         "ulog" | "ardupilot" | "blackbox" => {
             let _ = parameters(path);
-            let Ok((log, report)) = import_without_map(path, &|_, _| {}) else { return };
+            let found = is_placed(import_without_map(path, &|_, _| {}), path);
+            let Some((log, report)) = found else { return };
             assert!(!report.to_string().is_empty());
             // What is read can be written.
             log.write(&path.with_extension("mcap")).unwrap();
@@ -144,16 +171,19 @@ fn read(kind: &str, path: &Path) {
         "ulog-map" => by_map(&topic("sensor_combined", "timestamp", "us", "\"gyro_rad[0]\"")),
         "mcap" | "mcap-loose" => log_attack::read(path),
         "bag" => {
-            if let Ok((map, _)) = map_of_bag(path, &[]) {
-                let _ = import(&map, &[path.to_path_buf()]);
+            if let Some((map, _)) = is_placed(map_of_bag(path, &[]), path) {
+                is_placed(import(&map, &[path.to_path_buf()]), path);
             }
         }
         "usd" => {
             by_map(CRAZYPAD);
-            let _ =
-                Reading::new(&[path.to_path_buf()], None, &[]).and_then(|r| r.import(&|_, _| {}));
+            let reading = Reading::new(&[path.to_path_buf()], None, &[]);
+            is_placed(reading.and_then(|reading| reading.import(&|_, _| {})), path);
         }
         "csv" | "parquet" | "parquet-split" => by_map(&one_source(OMEGA)),
+        "json" | "json-zstd" => {
+            by_map(&topic("/imu", "log_time", "ns", "\"w.x\", \"w.yz[0]\", \"up\""));
+        }
         "protobuf" => by_map(&topic("/flight", "log_time", "ns", "\"maybe\"")),
         "mat" | "mat-packed" => {
             let map = topic("", "t", "s", "\"log.gyro[0]\"");
@@ -162,14 +192,15 @@ fn read(kind: &str, path: &Path) {
         // A map that is taken reads the file that it was made for.
         _ => {
             let Ok(text) = fs::read_to_string(path) else { return };
-            let Ok(map) = ImportMap::parse(&text, "map") else { return };
-            if kind == "map" {
-                let _ = import(&map, &[data("crazypad/E8_log00.bin")]);
+            let Some(map) = is_placed(ImportMap::parse(&text, "map"), path) else { return };
+            let of = if kind == "map" {
+                data("crazypad/E8_log00.bin")
             } else {
                 let table = path.with_extension("csv");
                 fs::write(&table, TABLE).unwrap();
-                let _ = import(&map, &[table]);
-            }
+                table
+            };
+            is_placed(import(&map, std::slice::from_ref(&of)), &of);
         }
     }
 }
@@ -227,17 +258,46 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
+/// Reads files as the kind is read, in a process that may have so much memory and processor time.
+///
+/// * `count` - of mutations; none of them: the file alone, as it is
+#[cfg(unix)]
+fn read_in_child(kind: &str, count: u64, seed: u64, file: &Path) {
+    let seconds = CHILD_S * count.div_ceil(1000).max(2);
+    let child = Command::new("sh")
+        .arg("-c")
+        .arg(format!("ulimit -v {CHILD_KIB} && ulimit -t {seconds} && exec \"$0\" \"$@\""))
+        .arg(std::env::current_exe().unwrap())
+        .args(["import_attack::attack_child", "--exact", "--test-threads=1"])
+        .env(ASKED, format!("{kind} {count} {seed} {}", file.display()))
+        .env("MALLOC_ARENA_MAX", "1")
+        .env("RUST_BACKTRACE", "0")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&child.stdout);
+    assert!(
+        child.status.success() && said.contains("1 passed"),
+        "{kind}: {} by {}\n{said}{}",
+        child.status,
+        file.display(),
+        String::from_utf8_lossy(&child.stderr)
+    );
+}
+
 /// The child's part: nothing, unless it is one.
 #[test]
 fn attack_child() {
     let Ok(asked) = std::env::var(ASKED) else { return };
     let [kind, count, seed, file]: [&str; 4] =
         asked.split(' ').collect::<Vec<_>>().try_into().unwrap();
-    let (good, file) = (good(kind), Path::new(file));
+    let (good, file, count) = (good(kind), Path::new(file), count.parse::<u64>().unwrap());
+    if count == 0 {
+        return read(kind, file);
+    }
     fs::write(file, file_of(kind, good.clone())).unwrap();
     read(kind, file);
     let mut rng = Pcg64Mcg::seed_from_u64(seed.parse().unwrap());
-    for _ in 0..count.parse::<u64>().unwrap() {
+    for _ in 0..count {
         fs::write(file, file_of(kind, mutate(&good, kind, &mut rng))).unwrap();
         read(kind, file);
     }
@@ -252,31 +312,13 @@ fn no_mutated_file_ends_a_reader() {
     let (count, seed) = (number(COUNT, COUNT_IN_TESTS), number(SEED, 1));
     let folder = folder("run");
     for kind in KINDS {
-        let file = folder.join(format!("{kind}.mutated"));
-        let seconds = CHILD_S * count.div_ceil(1000).max(2);
-        let child = Command::new("sh")
-            .arg("-c")
-            .arg(format!("ulimit -v {CHILD_KIB} && ulimit -t {seconds} && exec \"$0\" \"$@\""))
-            .arg(std::env::current_exe().unwrap())
-            .args(["import_attack::attack_child", "--exact", "--test-threads=1"])
-            .env(ASKED, format!("{kind} {count} {seed} {}", file.display()))
-            .env("MALLOC_ARENA_MAX", "1")
-            .env("RUST_BACKTRACE", "0")
-            .output()
-            .unwrap();
-        let said = String::from_utf8_lossy(&child.stdout);
-        assert!(
-            child.status.success() && said.contains("1 passed"),
-            "{kind}: {} by {}\n{said}{}",
-            child.status,
-            file.display(),
-            String::from_utf8_lossy(&child.stderr)
-        );
+        read_in_child(kind, count, seed, &folder.join(format!("{kind}.mutated")));
     }
     fs::remove_dir_all(folder).unwrap();
 }
 
-/// Files that once ended a reader.
+/// Files that once ended a reader, within the limits of the others.
+#[cfg(unix)]
 #[test]
 fn what_ended_a_reader_once_does_not_again() {
     for entry in fs::read_dir(data("attack")).unwrap() {
@@ -285,7 +327,7 @@ fn what_ended_a_reader_once_does_not_again() {
         let copy = folder("finds").join(&name);
         fs::copy(&path, &copy).unwrap();
         if let Some(kind) = KINDS.iter().rev().find(|kind| name.starts_with(&format!("{kind}."))) {
-            read(kind, &copy);
+            read_in_child(kind, 0, 0, &copy);
         }
     }
 }

@@ -218,6 +218,31 @@ fn a_bad_file_is_one_line_that_says_what_is_wrong() {
     }
 }
 
+/// Numbers that are all the same take no room in a file, and eight bytes each in memory.
+#[test]
+fn a_small_table_that_unpacks_into_a_large_one_is_refused() {
+    const MEGABYTES: usize = 256;
+    let rows = MEGABYTES * 1_000_000 / 8 / 4 + 1;
+    let table = parquet_bytes(
+        "required int64 t; required boolean x; required boolean y; required boolean z;",
+        &[
+            Cells::Longs(vec![Some(0); rows]),
+            Cells::Bools(vec![Some(true); rows]),
+            Cells::Bools(vec![Some(true); rows]),
+            Cells::Bools(vec![Some(true); rows]),
+        ],
+        rows,
+        Compression::SNAPPY,
+    );
+    assert!(table.len() < MEGABYTES * 1_000_000 / 100, "{} bytes", table.len());
+    let flight = flight();
+    flight.write("f.parquet", &table);
+    let error = flight.import(&map("f.parquet"), &["f.parquet"]).unwrap_err();
+    let said = flight.message(&error);
+    let begin = format!("f.parquet: its content is larger than {MEGABYTES} MB");
+    assert!(said.starts_with(&begin) && !said.contains('\n'), "{said}");
+}
+
 #[test]
 fn a_map_that_asks_for_what_is_not_there_is_refused() {
     let flight = flight();

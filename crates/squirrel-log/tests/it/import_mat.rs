@@ -111,6 +111,28 @@ fn a_mat_file_that_says_something_else_is_one_line() {
     }
 }
 
+/// 40 kB of packed zeros are 40 MB, and as a column of numbers 320 MB.
+#[test]
+fn a_small_file_that_unpacks_into_a_large_one_is_refused() {
+    const SAMPLES: u32 = 40_000_000;
+    let flight = Flight::new("mat-bomb", &[]);
+    let plain = std::fs::read(data("mat/plain.mat")).unwrap();
+    // An array of int8: flags, sizes, name, numbers.
+    let parts = [[6, 8, 8, 0], [5, 8, SAMPLES, 1], [1, 1, u32::from(b't'), 0]];
+    let mut matrix =
+        parts.as_flattened().iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>();
+    matrix.extend([1, SAMPLES].map(u32::to_le_bytes).concat());
+    matrix.resize(matrix.len() + SAMPLES as usize, 0);
+    let variable =
+        [&[14, matrix.len() as u32].map(u32::to_le_bytes).concat()[..], &matrix].concat();
+    let packed = miniz_oxide::deflate::compress_to_vec_zlib(&variable, 1);
+    let head = [15, packed.len() as u32].map(u32::to_le_bytes).concat();
+    flight.write("f.mat", &[&plain[..128], &head, &packed].concat());
+    let error = flight.import(&map("", "t", &["t"]), &["f.mat"]).unwrap_err();
+    let said = flight.message(&error);
+    assert!(said.starts_with("f.mat: its content is larger than 256 MB"), "{said}");
+}
+
 /// Every cut and every flipped byte of two small files: an error of one line or a flight.
 #[test]
 fn no_cut_and_no_flip_of_a_mat_file_ends_the_program() {

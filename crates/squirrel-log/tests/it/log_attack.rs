@@ -13,6 +13,8 @@ use mcap::records::op;
 use mcap::sans_io::{LinearReadEvent, LinearReader};
 use squirrel_log::{FlightLog, LogError, LogReader};
 
+use crate::import_attack::is_placed;
+
 /// Opcode and length of a record.
 const HEAD: usize = 9;
 /// A chunk ends behind so many bytes: a log of 40 kB has several.
@@ -22,7 +24,7 @@ const CHUNK_BYTES: usize = 8_000;
 /// it is whole.
 pub(crate) fn read(path: &Path) {
     let whole = FlightLog::read(path);
-    let _ = FlightLog::recover(path);
+    is_placed(FlightLog::recover(path), path);
     match (in_pieces(path), whole) {
         (Ok(Some(pieces)), Ok(whole)) => assert_eq!(bits(&pieces), bits(&whole)),
         // One that was changed behind its samples: known when they were given out.

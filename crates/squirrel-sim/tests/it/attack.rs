@@ -6,6 +6,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use squirrel_core::nalgebra::Vector3;
+use squirrel_core::policy::Policy;
 use squirrel_log::FlightLog;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
@@ -162,7 +163,7 @@ fn no_mutated_scenario_ends_the_program() {
     assert!(flown > 0);
 }
 
-fn bytes(good: &[u8], rng: &mut Pcg64Mcg) -> Vec<u8> {
+pub(super) fn bytes(good: &[u8], rng: &mut Pcg64Mcg) -> Vec<u8> {
     let mut bytes = good.to_vec();
     for _ in 0..rng.random_range(1..4) {
         // The header is short and matters most.
@@ -183,16 +184,29 @@ fn bytes(good: &[u8], rng: &mut Pcg64Mcg) -> Vec<u8> {
 fn no_mutated_weights_end_the_program() {
     let (count, mut rng) = count_and_rng();
     let path = folder().join("w.safetensors");
-    for _ in 0..count {
-        let bytes = bytes(PARNN, &mut rng);
-        if let Err(error) = ParnnWeights::parse("w", bytes.clone()) {
-            is_a_line(&error.to_string());
-        }
-        std::fs::write(&path, bytes).unwrap();
-        if let Err(error) = PolicyWeights::load(&path) {
-            is_a_line(&error.to_string());
+    PolicyWeights::save(&Policy::filled(0.25), &path).unwrap();
+    let policy = std::fs::read(&path).unwrap();
+    let mut taken = [0; 2];
+    for k in 0..count {
+        let is_policy = k % 2 == 1;
+        let bytes = bytes(if is_policy { &policy } else { PARNN }, &mut rng);
+        for (of_policy, read) in [
+            (false, ParnnWeights::parse("w", bytes.clone()).map(drop)),
+            (true, {
+                std::fs::write(&path, &bytes).unwrap();
+                PolicyWeights::load(&path).map(drop)
+            }),
+        ] {
+            match read {
+                Ok(()) => {
+                    assert_eq!(of_policy, is_policy);
+                    taken[usize::from(is_policy)] += 1;
+                }
+                Err(error) => is_a_line(&error.to_string()),
+            }
         }
     }
+    assert!(taken.iter().all(|taken| *taken > 0), "{taken:?} of {count} taken");
 }
 
 #[test]

@@ -16,7 +16,7 @@ fn wire(value: &impl Wire) -> Vec<u8> {
 }
 
 /// A flight, and each of its records as a board would send it: the setup first.
-fn flown() -> (FlightLog, Vec<Vec<u8>>) {
+pub(super) fn flown() -> (FlightLog, Vec<Vec<u8>>) {
     let scenario = Scenario { duration_s: 4.0, ..Scenario::find("random_spread").unwrap() };
     let setup = Setup {
         vehicle: VehicleFile::squirrel(),

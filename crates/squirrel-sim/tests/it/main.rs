@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod attack;
+mod attack_board;
 mod attack_replay;
 mod beside_pc;
 mod board_log;

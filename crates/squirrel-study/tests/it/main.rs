@@ -1,6 +1,7 @@
 //! The tests of the experiments. One binary: what they share is compiled and linked once.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod attack;
 mod claims;
 mod dispersion;
 mod faults;

@@ -151,6 +151,14 @@ fn a_study_that_changes_does_not_go_on_as_it_was() {
     let error = thrust::run(&changed, &kept).unwrap_err().to_string();
     assert!(error.contains("is of another plan"), "{error}");
 
+    // Another commit of the program, of the same version.
+    let flown = folder.below("flown");
+    let by = |commit| Keep { folder: Some(&flown), commit: Some(commit), ..Keep::default() };
+    thrust::run(&plan(1), &by("1f0a")).unwrap();
+    thrust::run(&plan(1), &by("1f0a")).unwrap();
+    let error = thrust::run(&plan(1), &by("2f0a")).unwrap_err().to_string();
+    assert!(error.contains("is of another plan") && error.contains("commit 1f0a"), "{error}");
+
     let empty = folder.below("empty");
     let nothing = Keep { folder: Some(&empty), ..Keep::default() };
     assert!(forest::run(&plan(1), 0.5, &nothing).is_err());

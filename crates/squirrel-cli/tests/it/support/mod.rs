@@ -2,6 +2,8 @@
 #![allow(dead_code, reason = "each test binary uses its part")]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+pub(crate) mod writers;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

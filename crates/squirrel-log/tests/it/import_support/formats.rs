@@ -144,8 +144,11 @@ pub(crate) type McapMessage<'a> = (&'a str, &'a str, u64, String);
 
 /// An MCAP file; messages go into chunks of about `chunk_bytes`.
 pub(crate) fn mcap_bytes(messages: &[McapMessage<'_>], chunk_bytes: u64) -> Vec<u8> {
+    mcap_by(WriteOptions::new().chunk_size(Some(chunk_bytes)).compression(None), messages)
+}
+
+pub(crate) fn mcap_by(options: WriteOptions, messages: &[McapMessage<'_>]) -> Vec<u8> {
     let mut file = Cursor::new(Vec::new());
-    let options = WriteOptions::new().chunk_size(Some(chunk_bytes)).compression(None);
     let mut writer = options.create(&mut file).unwrap();
     for (sequence, (topic, encoding, log_time, text)) in (0..).zip(messages) {
         let channel_id = writer.add_channel(0, topic, encoding, &BTreeMap::new()).unwrap();
