@@ -3,8 +3,8 @@
 
 use super::evidence::BETA;
 use super::linear::Linear;
-use super::parameters::Catalogue;
 use super::off::TOLERANCES_MIN;
+use super::parameters::Catalogue;
 use super::point::{Member, Point, hypothesis};
 use super::refine::Scored;
 use crate::GapError;
