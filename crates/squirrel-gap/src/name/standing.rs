@@ -99,21 +99,12 @@ fn clearness(search: &Search<'_>, naming: &Naming, holds: Option<&[Held]>, index
 
 /// An explanation that leaves nothing without those names whose numbers blocks of the flights do
 /// not tell from what the vehicle file has, the least clear first: evidence counts rows that a model
-/// misses together as if each were another proof. Nor with those that others, once their numbers
-/// are right, leave less for than they had to have to join them.
+/// misses together as if each were another proof.
 ///
 /// # Errors
 /// What the predictor says.
 fn clear(search: &Search<'_>, naming: Naming) -> Result<Naming, GapError> {
-    let naming = dropping(search, naming, |naming| Ok(search.least_clear(naming)))?;
-    dropping(search, naming, |naming| {
-        // Rotors of one machine are one thing.
-        let is_one = search.catalogue.is_of_one_machine || naming.found.best.members.len() < 2;
-        let worth = |i: &usize| naming.found.worth(*i);
-        let all = 0..naming.found.best.members.len();
-        let least = all.min_by(|a, b| worth(a).total_cmp(&worth(b)));
-        Ok(least.filter(|i| !is_one && worth(i) < FURTHER_NATS))
-    })
+    dropping(search, naming, |naming| Ok(search.least_clear(naming)))
 }
 
 /// An explanation that leaves nothing without those names that held-out flights are predicted

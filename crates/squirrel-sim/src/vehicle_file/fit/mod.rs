@@ -42,6 +42,15 @@ impl Fitted {
     }
 }
 
+/// What was fitted, if these are numbers.
+fn finite(numbers: Vec<Fitted>, name: &str) -> Result<Vec<Fitted>, String> {
+    let is_none = |f: &&Fitted| !f.value.iter().chain(&f.sd).all(|x| x.is_finite());
+    numbers.iter().find(is_none).map_or(Ok(()), |Fitted { field, value, sd, .. }| {
+        Err(format!("{name}: {field} comes out as {value:?}, sd {sd:?}"))
+    })?;
+    Ok(numbers)
+}
+
 /// Scales thrust so that the mean rotor commands of a hover carry the weight.
 ///
 /// Samples count in which the vertical specific force is that of hover, within 8 %; with no

@@ -219,7 +219,7 @@ impl Stand {
             count * most * spread,
             &source,
         ));
-        Ok(StandFit { numbers, residual_n })
+        Ok(StandFit { numbers: super::finite(numbers, name)?, residual_n })
     }
 }
 

@@ -113,7 +113,7 @@ impl Swing {
 /// The inertia of a file with what swings say of it; axes that did not swing keep theirs.
 ///
 /// # Errors
-/// One line where the file has products of inertia.
+/// One line where the file has products of inertia, or swings that give none.
 pub fn fit(file: &VehicleFile, swings: &[Swing], name: &str) -> Result<SwingFit, String> {
     let p = file.vehicle.parameters();
     let j = p.inertia_kg_m2;
@@ -151,7 +151,7 @@ pub fn fit(file: &VehicleFile, swings: &[Swing], name: &str) -> Result<SwingFit,
         .collect();
     let source = format!("fitted: swings about {} in {name}", axes.join(", "));
     let numbers = vec![Fitted { field: "mass.inertia_kg_m2".to_owned(), value, sd, source }];
-    Ok(SwingFit { numbers })
+    Ok(SwingFit { numbers: super::finite(numbers, name)? })
 }
 
 /// The axis that swings in a log, 0 to 2, and its period, s: of the body rate that turns most, the

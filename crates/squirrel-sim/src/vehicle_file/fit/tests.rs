@@ -97,6 +97,9 @@ fn swings_say_the_inertia() {
         let error = Swing::parse(text, "w.csv").unwrap_err();
         assert!(error.starts_with("w.csv") && error.contains(word), "{error}");
     }
+    let far = "axis,period_s,thread_length_m,thread_distance_m\ny,1e200,1.5,0.2\n";
+    let error = swings(&squirrel(), &Swing::parse(far, "w.csv").unwrap(), "w.csv").unwrap_err();
+    assert!(error.starts_with("w.csv: mass.inertia_kg_m2 comes out as ["), "{error}");
 }
 
 fn log(source: &str, channel: &str, width: usize, time_s: Vec<f64>, values: Vec<f64>) -> FlightLog {
