@@ -62,6 +62,8 @@ class Metrics(TypedDict):
         The same by satellite fix and barometer, as they arrive.
     height_lost_m, height_gained_m : float or None
         Largest sink below and climb above the reference height.
+    height_lost_unflagged_m : float or None
+        What of the sink was lost before the first of `flags`.
     wings_open_s, wiic_s : float
         Time with wings more than half spread, and in which WIIC flew.
     clearance_m : float or None
@@ -90,6 +92,7 @@ class Metrics(TypedDict):
     rmse_horizontal_m: float | None
     rmse_measured_m: float | None
     height_lost_m: float | None
+    height_lost_unflagged_m: float | None
     height_gained_m: float | None
     wings_open_s: float
     wiic_s: float
