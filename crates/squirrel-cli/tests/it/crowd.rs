@@ -1,19 +1,13 @@
 //! Two and ten programs that write the same results at once: each goes through or is told that
 //! somebody else has the folder, and what is there then is of one of them, whole.
 
-use crate::support::writers::{Files, Writer, files};
+use crate::support::writers::{Writer, files};
 use std::fs;
 use std::process::{Child, Command, Stdio};
 
 fn is_crowded(writer: &Writer) {
     let out = writer.folder.0.join("out");
-    let alone = |words: &[&str]| -> Files {
-        let _ = fs::remove_dir_all(&out);
-        fs::create_dir_all(&out).unwrap();
-        writer.folder.succeeds(words);
-        files(&out)
-    };
-    let both = [alone(&writer.old), alone(&writer.new)];
+    let both = [&writer.old, &writer.new].map(|words| writer.alone(words));
     for many in [2, 10] {
         fs::remove_dir_all(&out).unwrap();
         fs::create_dir_all(&out).unwrap();

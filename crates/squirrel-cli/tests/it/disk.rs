@@ -2,7 +2,7 @@
 //! files whole or the new ones, and nothing half-written beside them.
 #![cfg(target_os = "linux")]
 
-use crate::support::writers::{Files, Writer, are_whole, files, put};
+use crate::support::writers::{Writer, are_whole, files, put};
 use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
@@ -40,13 +40,7 @@ fn is_one_line(writer: &Writer, output: &Output) -> bool {
 /// * `fails` - starts it there
 fn is_left_whole(writer: &Writer, fails: &[&dyn Fn() -> Command]) -> Vec<bool> {
     let out = writer.folder.0.join("out");
-    let run = |words: &[&str]| -> Files {
-        let _ = fs::remove_dir_all(&out);
-        fs::create_dir_all(&out).unwrap();
-        writer.folder.succeeds(words);
-        files(&out)
-    };
-    let (new, old) = (run(&writer.new), run(&writer.old));
+    let (new, old) = (writer.alone(&writer.new), writer.alone(&writer.old));
     let one = |start: &&dyn Fn() -> Command| {
         fs::remove_dir_all(&out).unwrap();
         put(&out, &old, writer.grows);

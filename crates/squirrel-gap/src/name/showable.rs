@@ -18,7 +18,6 @@ use super::gusts::{GUST_M_S, GUST_SHARE};
 use super::off::TOLERANCES_MIN;
 use super::parameters::Candidate;
 use super::search::Search;
-
 use crate::GapError;
 use crate::leftover::{SLOW_RATIO, noise, slow_parts};
 use crate::predictor::{Predictor, TURBULENCE_M_S};

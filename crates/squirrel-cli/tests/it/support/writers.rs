@@ -26,6 +26,15 @@ impl Writer {
         Self { folder, new: words(0), old: words(1), grows: never }
     }
 
+    /// What a run leaves in an empty `out`.
+    pub(crate) fn alone(&self, words: &[&str]) -> Files {
+        let out = self.folder.0.join("out");
+        let _ = fs::remove_dir_all(&out);
+        fs::create_dir_all(&out).unwrap();
+        self.folder.succeeds(words);
+        files(&out)
+    }
+
     pub(crate) fn fly(name: &str) -> Self {
         Self::of(Folder::new(name), |run| {
             let seed = ["1", "2"][run];
