@@ -36,7 +36,7 @@ pub(crate) fn chore(_: &[String]) -> Result<(), String> {
         return Err(format!("{PAGE}: an effect is a file and a line, and changes {lines:#?}"));
     }
     copied(&root, &copy)?;
-    // A version of its own: cargo takes the crates of two folders that share a target folder for the
+    // A version of its own: cargo takes the crates of two folders that share a build folder for the
     // same, and what is built here would be what is run there.
     let (manifest, own) = (copy.join("Cargo.toml"), format!("version = \"{VERSION}\""));
     let text = read(&manifest)?.replace(&own, "version = \"0.0.0-effect\"");
@@ -67,7 +67,9 @@ pub(crate) fn chore(_: &[String]) -> Result<(), String> {
 /// are there already.
 fn tested(copy: &Path, name: &str) -> Result<(), String> {
     let mut command = Command::new("cargo");
-    command.current_dir(copy).env("CARGO_TARGET_DIR", target_directory()?);
+    // Shared is what is built on the way; the programs, which have one name in both, stay here.
+    command.current_dir(copy).env("CARGO_BUILD_BUILD_DIR", target_directory()?);
+    command.env("CARGO_TARGET_DIR", copy.join("target"));
     command.env("SQUIRREL_EFFECT", name).env("SQUIRREL_EFFECTS_WRITE", "1");
     // The lock file has the version that the copy no longer has; everything is there already.
     command.args(["test", "--release", "--offline"]);

@@ -31,6 +31,8 @@ pub struct Recovery {
     pub messages: u64,
     /// Time of the last sample, s; 0 if there is none.
     pub end_time_s: f64,
+    /// Whether the metadata have a checksum and match it; files of before version 2 have none.
+    pub metadata_checked: bool,
 }
 
 impl FlightLog {
@@ -131,6 +133,7 @@ fn load(
     if cut && reader.metadata.is_none() {
         return Err(LogError::NothingWhole { file, bytes_total });
     }
+    let metadata_checked = reader.has_metadata_crc();
     let log = reader.finish()?;
     let ends = log.sources.values().filter_map(|source| source.time_s.last().copied());
     let recovery = Recovery {
@@ -138,6 +141,7 @@ fn load(
         bytes_whole: if cut { whole as u64 } else { bytes_total },
         messages: log.sources.values().map(|source| source.time_s.len() as u64).sum(),
         end_time_s: ends.reduce(f64::max).unwrap_or(0.0),
+        metadata_checked,
     };
     Ok((log, recovery, cut))
 }
@@ -296,6 +300,10 @@ impl<'a> Reader<'a> {
         }
         let set = schema.map_or(&[][..], |schema| &schema.set);
         SourceReader::new(topic, name, set).map(Topic::Source).map_err(|what| self.corrupt(what))
+    }
+
+    fn has_metadata_crc(&self) -> bool {
+        self.metadata.as_ref().is_some_and(|metadata| metadata.contains_key(METADATA_CRC))
     }
 
     /// The metadata so far, if there are any.

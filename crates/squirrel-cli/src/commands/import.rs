@@ -116,6 +116,9 @@ impl Import {
             recovery.end_time_s,
             recovery.messages
         ));
+        if !recovery.metadata_checked {
+            say("its metadata (vehicle, scenario, settings) have no checksum: look at them");
+        }
         talk(&format!("wrote {}", self.out.display()));
         output::write_json(self.json.as_deref(), &recovery)
     }

@@ -13,6 +13,7 @@ mod program;
 mod reach;
 mod said;
 mod support;
+mod terminal;
 mod train;
 mod vehicle;
 mod view;

@@ -111,7 +111,7 @@ fn of_a_truncated_file_every_whole_second_is_recovered() {
         assert_eq!(recovery.messages, messages as u64);
         assert_eq!(recovery.end_time_s, end_s);
         assert_eq!(recovery.bytes_total, length as u64);
-        assert!(recovery.bytes_whole <= recovery.bytes_total);
+        assert!(recovery.bytes_whole <= recovery.bytes_total && recovery.metadata_checked);
         assert_eq!(
             line(&file, &error),
             format!(
@@ -264,6 +264,8 @@ fn a_file_written_anew_by_another_tool_is_read() {
     flight(2).write(&file).unwrap();
     rewrite(&file, |_, _, _| {});
     assert_eq!(FlightLog::read(&file).unwrap(), flight(2));
+    // No checksum of ours is over these metadata, and nothing vouches for them.
+    assert!(!FlightLog::recover(&file).unwrap().1.metadata_checked);
 }
 
 #[test]
