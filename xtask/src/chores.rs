@@ -43,9 +43,17 @@ const QUICK_NEEDS: Step = Step {
     action: Action::Function(|| python::reachable().map(|()| String::new())),
 };
 
-const TEST: [Step; 12] = [
+const TEST: [Step; 13] = [
     Step { name: "python", action: Action::Function(python::prepare) },
-    Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
+    // Examples as tests alone: clippy has looked at the programs that they are, too.
+    Step {
+        name: "test",
+        action: Action::Cargo(&["test", "--release", "--workspace", "--locked", "--tests"]),
+    },
+    Step {
+        name: "doc-test",
+        action: Action::Cargo(&["test", "--release", "--workspace", "--locked", "--doc"]),
+    },
     Step { name: "thumb", action: Action::Function(thumb::check) },
     Step { name: "firmware", action: Action::Function(firmware::step) },
     Step { name: "deny", action: Action::Function(deny) },

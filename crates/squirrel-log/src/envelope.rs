@@ -148,6 +148,26 @@ pub(super) fn lengths_fit(opcode: u8, body: &[u8]) -> bool {
     fits.is_some()
 }
 
+/// Bytes that a chunk unpacks to by its own word; `None` if its content cannot be so much. mcap's
+/// reader makes room for what it is told.
+pub(super) fn unpacked_bytes(chunk: &[u8]) -> Option<u64> {
+    let mut rest = Rest(chunk);
+    // Behind two times; before the content stand its CRC, packing and length.
+    rest.skip(16)?;
+    let told = u64::from_le_bytes(*rest.take(8)?.first_chunk()?);
+    rest.skip(4)?;
+    let packing = rest.sized()?;
+    let length = u64::from_le_bytes(*rest.take(8)?.first_chunk()?);
+    let content = rest.take(usize::try_from(length).ok()?)?;
+    let most = match packing {
+        b"zstd" => zstd::zstd_safe::decompress_bound(content).ok()?,
+        b"" => length,
+        // Nothing that is read here.
+        _ => u64::MAX,
+    };
+    (told <= most).then_some(told)
+}
+
 /// What is left of a record.
 struct Rest<'a>(&'a [u8]);
 

@@ -206,11 +206,19 @@ impl<'a> Reader<'a> {
         }
         // MCAP's own reader unpacks the chunk; it gives nothing out before the chunk's CRC is
         // right.
+        let unpacked = envelope::unpacked_bytes(frame.body()).ok_or_else(|| {
+            let at = frame.start;
+            self.corrupt(format!(
+                "the chunk at byte {at} says that it unpacks to more than it holds"
+            ))
+        })?;
+        // No record is longer than what it is in.
+        let most = unpacked.max(frame.bytes.len() as u64) as usize;
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
             .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(RECORD_MAX_BYTES);
+            .with_record_length_limit(RECORD_MAX_BYTES.min(most));
         let mut reader = LinearReader::new_with_options(options);
         let mut rest = frame.bytes;
         while let Some(event) = reader.next_event() {

@@ -25,7 +25,7 @@ use super::map::ImportMap;
 use super::meter::Meter;
 use super::names::nearest;
 use super::table::{TableFile, checked};
-use crate::envelope::{self, lengths_fit};
+use crate::envelope::{self, lengths_fit, unpacked_bytes};
 use crate::files::{self, Budget, TooLarge};
 use cdr::CdrFile;
 use json::JsonFile;
@@ -282,13 +282,20 @@ impl Reading<'_> {
         };
         let too_long = || "damaged: a length in a record is larger than the record".to_owned();
         // The reader takes chunks apart itself; what it hands out is looked at below.
-        let mut chunks = envelope::frames(bytes).filter(|frame| frame.opcode == op::CHUNK);
-        if !chunks.all(|chunk| lengths_fit(op::CHUNK, chunk.body())) {
-            return Err(too_long().into());
+        let mut most = bytes.len() as u64;
+        for chunk in envelope::frames(bytes).filter(|frame| frame.opcode == op::CHUNK) {
+            if !lengths_fit(op::CHUNK, chunk.body()) {
+                return Err(too_long().into());
+            }
+            let unpacked = unpacked_bytes(chunk.body()).ok_or_else(|| {
+                "damaged: a chunk says that it unpacks to more than it holds".to_owned()
+            })?;
+            most = most.max(unpacked);
         }
+        // No record is longer than what it is in.
         let options = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(RECORD_MAX_BYTES);
+            .with_record_length_limit(RECORD_MAX_BYTES.min(most as usize));
         let mut reader = LinearReader::new_with_options(options);
         let mut rest = bytes;
         while let Some(event) = reader.next_event() {
