@@ -9,7 +9,7 @@ use crate::state::rotations;
 use crate::terms::Terms;
 use crate::vehicle::Vehicle;
 use nalgebra::Vector3;
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyMemoryError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
@@ -27,8 +27,17 @@ use squirrel_sim::arm::Arm;
 use std::sync::{Mutex, MutexGuard};
 
 /// An empty memory for each vehicle.
-pub(crate) fn memory<T: Clone + Default>(count: usize) -> PyResult<Mutex<Vec<T>>> {
-    Ok(Mutex::new(vec![T::default(); checked_count("count", count)?]))
+pub(crate) fn memory<T: Default>(count: usize) -> PyResult<Mutex<Vec<T>>> {
+    let count = checked_count("count", count)?;
+    let mut all = Vec::new();
+    all.try_reserve_exact(count).map_err(|error| PyMemoryError::new_err(error.to_string()))?;
+    Python::attach(|py| {
+        for turn in 0..count {
+            now_and_then(py, turn)?;
+            all.push(T::default());
+        }
+        Ok(Mutex::new(all))
+    })
 }
 
 /// The memory of a law, one for each vehicle.

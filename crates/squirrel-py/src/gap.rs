@@ -2,7 +2,7 @@
 //! back.
 
 use crate::error::value;
-use crate::interrupt::{Stop, interruptible};
+use crate::interrupt::{Stop, interruptible, look};
 use crate::json;
 use crate::log::FlightLog;
 use crate::vehicle::{Vehicle, write_file};
@@ -13,20 +13,31 @@ use squirrel_gap::{Flights, Verdict, Workflow};
 use squirrel_sim::vehicle_file::{VehicleFile, listed_effects};
 use std::path::{Path, PathBuf};
 
-/// Names and logs in the order of the dictionary.
-pub(crate) fn logs(argument: &str, flights: &Bound<'_, PyDict>) -> PyResult<Flights> {
-    let named = flights.iter().map(|(name, log)| {
+/// Names and logs in the order of the dictionary; each is copied, and Ctrl-C ends it between two.
+fn logs(argument: &str, flights: &Bound<'_, PyDict>) -> PyResult<Flights> {
+    let copied = named(argument, flights).map(|flight| {
+        look(flights.py())?;
+        let (name, log) = flight?;
+        Ok((name, squirrel_log::FlightLog::clone(&log.get().log)))
+    });
+    copied.collect()
+}
+
+/// The flights of an argument, as they lie in Python.
+pub(crate) fn named<'py>(
+    argument: &str,
+    flights: &Bound<'py, PyDict>,
+) -> impl Iterator<Item = PyResult<(String, Bound<'py, FlightLog>)>> {
+    flights.iter().map(move |(name, log)| {
         let wrong = || {
             value(format!(
                 "{argument}: expected names (str) and FlightLogs, got {name} of {}",
                 log.get_type()
             ))
         };
-        let name: String = name.extract().map_err(|_| wrong())?;
-        let log = log.cast::<FlightLog>().map_err(|_| wrong())?;
-        Ok((name, squirrel_log::FlightLog::clone(&log.get().log)))
-    });
-    named.collect()
+        let own: String = name.extract().map_err(|_| wrong())?;
+        Ok((own, log.cast::<FlightLog>().map_err(|_| wrong())?.clone()))
+    })
 }
 
 /// The effects that a vehicle file may name.

@@ -2,7 +2,7 @@
 
 use crate::arguments::{Array32, Numbers, rows};
 use crate::error::{self, value};
-use crate::gap::logs;
+use crate::gap::named;
 use crate::interrupt::{interruptible, look};
 use crate::json;
 use crate::kept::{broken, reduced};
@@ -278,10 +278,12 @@ fn windows_of(
     flights: &Bound<'_, PyDict>,
 ) -> PyResult<Windows> {
     let mut all = Windows::new();
-    for (name, log) in logs("flights", flights)? {
+    for flight in named("flights", flights) {
         look(py)?;
+        let (name, log) = flight?;
+        let log = &log.get().log;
         let found =
-            py.detach(|| labels::windows(vehicle, &name, &log)).map_err(|e| error::nn(&e))?;
+            py.detach(|| labels::windows(vehicle, &name, log)).map_err(|e| error::nn(&e))?;
         all.push(&name, &found).map_err(|e| error::nn(&e))?;
     }
     Ok(all)

@@ -54,7 +54,9 @@ def test_loops_look_every_so_many_turns(vehicle: squirrel.Vehicle) -> None:
         "Tasks": (lambda: squirrel.Tasks(task="avoid", vehicles=[vehicle], num_envs=2000), 2000, 128),
         "Tasks.reset": (squirrel.Tasks(task="avoid", vehicles=[vehicle], num_envs=2000).reset, 2000, 128),
         "Policy": (lambda: policy(np.zeros((5 * N, 25), np.float32)), 5 * N, 16_384),
-        "Stack.step": (lambda: squirrel.Stack(vehicle, count=N).step(time_us=1), N, TURNS),
+        "Stack": (lambda: squirrel.Stack(vehicle, count=N), N, TURNS),
+        "Twcc": (lambda: squirrel.control.Twcc(vehicle, count=N), N, TURNS),
+        "Stack.step": (lambda: squirrel.Stack(vehicle, count=N).step(time_us=1), 2 * N, TURNS),
         "Backstepping.step": (
             lambda: squirrel.control.Backstepping(vehicle, count=N).step(
                 q_ned_from_body_wxyz=q, omega_body_rad_s=three, angle_rad=three, dt_s=0.01
@@ -87,6 +89,12 @@ def test_who_waits_for_another_thread_looks_meanwhile(vehicle: squirrel.Vehicle,
     }
     for name, call in calls.items():
         assert looks(call) > 0, name
+
+
+def test_flights_are_copied_one_by_one(vehicle: squirrel.Vehicle, flights: dict[str, squirrel.FlightLog]) -> None:
+    many = {f"{name} {i}": flight for i in range(20) for name, flight in flights.items()}
+    assert looks(lambda: squirrel.nn.windows(many)) >= len(many)
+    assert looks(lambda: squirrel.gap.find(vehicle=vehicle, flights=many)) >= len(many)
 
 
 ENDLESS: dict[str, Callable[[squirrel.Vehicle], object]] = {
