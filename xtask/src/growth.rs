@@ -2,7 +2,7 @@
 //!
 //! Memory does not depend on what else the machine does, so it is held to bounds; times are shown.
 
-use crate::run::{call, cargo, root, target_directory};
+use crate::run::{programs, root, target_directory};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -51,11 +51,10 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
     let longest = arguments.first().map_or(Ok(120), |text| {
         text.parse::<u32>().map_err(|_| format!("MINUTES: `{text}` is no whole number"))
     })?;
-    call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-cli"]))?;
-    let target = target_directory()?;
-    let folder = target.join("growth");
+    let program = programs(&["squirrel"])?.join("squirrel");
+    let folder = target_directory()?.join("growth");
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let lab = Lab { program: target.join("release").join("squirrel"), folder };
+    let lab = Lab { program, folder };
     let mut rows = lab.lengths(longest)?;
     rows.push(lab.flights(if longest < 120 { 50 } else { 100 })?);
     std::fs::remove_dir_all(&lab.folder).map_err(|e| format!("{}: {e}", lab.folder.display()))?;
