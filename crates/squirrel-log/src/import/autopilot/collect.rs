@@ -16,6 +16,12 @@ const LEAP_US: f64 = 10e6;
 /// Thirty years: no clock of an autopilot says more.
 const CLOCK_MAX_US: f64 = 1e15;
 
+/// A time in us, as whole as a clock's is. In a file whose types are damaged, times may lie so close
+/// together that in seconds they are one.
+fn to_a_nanosecond(t: f64) -> f64 {
+    if t.fract() == 0.0 { t } else { (t * 1e3).round() / 1e3 }
+}
+
 /// Messages of one topic with their times in order.
 pub(super) struct Topic<'a> {
     /// As the report calls it.
@@ -40,7 +46,7 @@ impl<'a> Topic<'a> {
         };
         let (time, us) = clock.iter().find_map(known)?;
         let (mut kept, mut time_us, mut last) = (Vec::new(), Vec::new(), f64::NEG_INFINITY);
-        for (row, t) in time.iter().map(|t| t * us).enumerate() {
+        for (row, t) in time.iter().map(|t| to_a_nanosecond(t * us)).enumerate() {
             // A flipped bit makes a time far ahead, after which all others would run backwards.
             let ahead = t - last > LEAP_US && time.get(row + 1).is_some_and(|next| next * us < t);
             if t > last && (0.0..CLOCK_MAX_US).contains(&t) && !ahead {
