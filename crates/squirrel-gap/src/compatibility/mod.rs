@@ -24,7 +24,7 @@ use crate::predictor::Predictor;
 use crate::verdict::{Kind, SetAside, Verdict};
 pub(crate) use channels::{channels, saturation};
 use flight::Flight;
-use pairs::Pairs;
+use pairs::{Pairs, Products};
 use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -196,6 +196,13 @@ const MOMENT_FIT: f64 = 0.75;
 /// 0.9 in measured flights of brushed motors whose moments the file does not know.
 const QUICK_FIT: f64 = 0.93;
 
+/// Measured moments over predicted ones between which noise alone lowers their correlations, and
+/// the least correlation that tells. Where a quiet flight is seen through a noisy gyroscope, the
+/// correlation is low and the slope is 0.97 to 1.05; of brushed motors whose moments the file does
+/// not know it is 0.1 to 0.2.
+const WHOLE: [f64; 2] = [0.7, 1.4];
+const TELLS: f64 = 0.25;
+
 /// What takes part of the moments of some flights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Moments {
@@ -224,18 +231,26 @@ pub(crate) fn leave_out(predictor: &mut Predictor<'_>, residual: &[f64], moments
 
 /// Whether the vehicle file's moments have to do with the measured ones; where they do not, nothing
 /// is named from them. A large moment that the file lacks is slow, as velocity is, and what is
-/// quick still follows the commands.
+/// quick still follows the commands. What a gyroscope adds does not change how much of a moment is
+/// in the measured one.
 pub(crate) fn moments_fit(predictor: &Predictor<'_>, residual: &[f64]) -> bool {
-    let fits: Vec<[f64; 2]> = (0..predictor.tracks.len())
-        .filter(|piece| predictor.tracks[*piece].measured.len() > 100)
-        .map(|piece| {
-            let flight = Flight::piece(predictor, piece);
-            let moments: Pairs = flight.predicted(residual, 3);
-            let undamped = moments.with_damping(&flight.omega());
-            let fit = |pairs: &Pairs| pairs.best_shift(flight.step_s(), 0.2).1;
-            [fit(&moments).max(fit(&undamped)), fit(&moments.changes())]
-        })
-        .collect();
+    let (mut fits, mut roll_and_pitch) = (Vec::new(), Products::default());
+    for piece in 0..predictor.tracks.len() {
+        if predictor.tracks[piece].measured.len() <= 100 {
+            continue;
+        }
+        let flight = Flight::piece(predictor, piece);
+        let moments: Pairs = flight.predicted(residual, 3);
+        let undamped = moments.with_damping(&flight.omega());
+        let fit = |pairs: &Pairs| pairs.best_shift(flight.step_s(), 0.2);
+        let (shift_s, own) = fit(&moments);
+        fits.push([own.max(fit(&undamped).1), fit(&moments.changes()).1]);
+        roll_and_pitch += moments.products((shift_s / flight.step_s()).round() as i64);
+    }
     let mean = |of: usize| fits.iter().map(|fit| fit[of]).sum::<f64>() / fits.len() as f64;
-    fits.is_empty() || mean(0) >= MOMENT_FIT || mean(1) >= QUICK_FIT
+    fits.is_empty()
+        || mean(0) >= MOMENT_FIT
+        || mean(1) >= QUICK_FIT
+        || (roll_and_pitch.correlation() >= TELLS
+            && (WHOLE[0]..=WHOLE[1]).contains(&roll_and_pitch.slope()))
 }

@@ -10,6 +10,7 @@
 //! only where it is beyond what as many independent samples show by chance.
 
 use nalgebra::Vector3;
+use std::ops::AddAssign;
 
 /// How much better another naming of the axes must fit, in sums of three correlations.
 const MARGIN: f64 = 0.8;
@@ -30,6 +31,33 @@ pub(super) struct Pairs(Vec<(Vector3<f64>, Vector3<f64>)>);
 
 /// An axis of another source and its sign, for each axis of the own one.
 pub(super) type Naming = [(usize, f64); 3];
+
+/// Sums over the first two axes of squares of own and other and of their products, about the means.
+#[derive(Default, Clone, Copy)]
+pub(super) struct Products {
+    own: f64,
+    other: f64,
+    both: f64,
+}
+
+impl Products {
+    /// What the first is times the second, whatever noise the first has.
+    pub(super) fn slope(self) -> f64 {
+        self.both / self.other
+    }
+
+    pub(super) fn correlation(self) -> f64 {
+        self.both / (self.own * self.other).sqrt()
+    }
+}
+
+impl AddAssign for Products {
+    fn add_assign(&mut self, more: Self) {
+        self.own += more.own;
+        self.other += more.other;
+        self.both += more.both;
+    }
+}
 
 impl Pairs {
     pub(super) fn push(&mut self, own: Vector3<f64>, other: Vector3<f64>) {
@@ -211,6 +239,22 @@ impl Pairs {
     pub(super) fn mean_ratio_z(&self) -> f64 {
         let (a, b) = self.means();
         a.z / b.z
+    }
+
+    /// Of the first, so many pairs later, and the second.
+    pub(super) fn products(&self, later: i64) -> Products {
+        let (a, b) = self.means();
+        let n = i64::try_from(self.0.len()).unwrap_or(i64::MAX);
+        let mut sums = Products::default();
+        for i in later.max(0)..(n + later.min(0)) {
+            let (x, y) = (self.0[i as usize].0 - a, self.0[(i - later) as usize].1 - b);
+            sums += Products {
+                own: x.xy().norm_squared(),
+                other: y.xy().norm_squared(),
+                both: x.xy().dot(&y.xy()),
+            };
+        }
+        sums
     }
 
     /// By how much the first is later than the second, s, and how well they then correlate; pairs

@@ -47,6 +47,30 @@ fn a_name_stands_beside_what_a_model_misses_everywhere() {
     assert!(patched.contains(&format!("[effects.{}]", verdict.effects[0].name)), "{patched}");
 }
 
+/// A circle is flown with moments that the vibration in a gyroscope is larger than: what is measured
+/// has little to do with what the file predicts, and all of what it predicts is in there.
+#[test]
+fn vibration_in_a_calm_flight_does_not_hide_a_moment() {
+    let off = "[effects.cg_offset]\ncg_x_m = 0.006\ncg_y_m = -0.005\n\n[limits]";
+    let flown = vehicle_with("squirrel.toml", &[("[limits]", off)]);
+    let mut state = 5_u64;
+    let mut noise = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    };
+    let flights = [1, 2].map(|seed| {
+        let (name, mut log) = fly("track", &flown, seed);
+        let imu = log.sources.get_mut("imu").unwrap();
+        let gyro = imu.channels.get_mut("omega_body_rad_s").unwrap();
+        gyro.values.iter_mut().for_each(|x| *x += 0.3 * noise());
+        (name, log)
+    });
+    let verdict = diagnose(&VehicleFile::squirrel(), &flights, &[], &|_| {}).unwrap().verdict;
+    println!("{} {:?}", verdict.words, verdict.notes);
+    assert!(!verdict.notes.iter().any(|note| note.starts_with("moments:")), "{:?}", verdict.notes);
+    assert_eq!(verdict.effects[0].name, "cg_offset", "{}", verdict.words);
+}
+
 /// A moment that no effect of the catalogue makes, so large that the file explains little of all:
 /// quick moments still follow the commands, so that they take part and it is seen.
 #[test]
