@@ -10,10 +10,14 @@
 use super::Found;
 use super::flight::Flight;
 use nalgebra::Vector3;
+use std::ops::Range;
 
-/// Shifts that are tried: up to, and apart, s.
-const SHIFT_MAX_S: f64 = 1.5;
+/// Shifts that are tried: so many either way, and apart, s.
+const SHIFTS: i32 = 75;
 const SHIFT_STEP_S: f64 = 0.02;
+const SLOTS: usize = 2 * SHIFTS as usize + 1;
+/// What changes within this time is quick, s.
+const QUICK_S: f64 = 0.1;
 /// Blocks between which a step is looked for, s, and the fewest on each side of it.
 const BLOCK_S: f64 = 2.0;
 const BLOCKS_MAX: f64 = 100.0;
@@ -30,12 +34,16 @@ struct Bar {
     by_s: f64,
     left: f64,
     explains: f64,
+    /// Whether what is quick must have the step, too.
+    quick: bool,
 }
 
-const ATTITUDE: Bar = Bar { f: 25.0, fit: 0.6, by_s: 0.07, left: 0.85, explains: f64::INFINITY };
-const FIXES: Bar = Bar { f: 25.0, fit: 0.6, by_s: 0.12, left: 0.8, explains: f64::INFINITY };
+const ATTITUDE: Bar =
+    Bar { f: 25.0, fit: 0.6, by_s: 0.07, left: 0.85, explains: f64::INFINITY, quick: false };
+const FIXES: Bar =
+    Bar { f: 25.0, fit: 0.6, by_s: 0.12, left: 0.8, explains: f64::INFINITY, quick: false };
 /// What commands do not explain is mostly noise of the rates' derivative, which has no time.
-const COMMANDS: Bar = Bar { f: 12.0, fit: 0.15, by_s: 0.07, left: 0.7, explains: 1.2 };
+const COMMANDS: Bar = Bar { f: 12.0, fit: 0.15, by_s: 0.07, left: 0.7, explains: 1.2, quick: true };
 /// On one side of it the clock is right: shifts that effects explain, s.
 const RIGHT_S: (f64, f64) = (-0.1, 0.5);
 /// Steps of two sources this close are one, s.
@@ -92,92 +100,124 @@ pub(super) fn steps(flight: &Flight, residual: &[f64]) -> Found {
 /// The step of the first against the second, if there is one: how much later the first comes after
 /// it.
 fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], bar: &Bar) -> Option<Step> {
-    let (own, other) = (centred(own), centred(other));
-    // Where a model has no finite answer, times are not known.
-    if own.len() != time_s.len() || other.len() != time_s.len() {
-        return None;
-    }
-    let (start_s, end_s) = (*time_s.first()?, *time_s.last()?);
-    let block_s = BLOCK_S.max((end_s - start_s) / BLOCKS_MAX);
-    let blocks = ((end_s - start_s) / block_s) as usize;
-    if blocks < 2 * SIDE_MIN {
-        return None;
-    }
-    let most = (SHIFT_MAX_S / SHIFT_STEP_S) as i32;
-    let shifts = (2 * most + 1) as usize;
-    // Of each block and shift: sums of own^2, other^2 and their product.
-    let mut sums = vec![[0.0; 3]; blocks * shifts];
-    let usual_s = (end_s - start_s) / time_s.len() as f64;
-    for (slot, shift) in (-most..=most).enumerate() {
-        let shift_s = f64::from(shift) * SHIFT_STEP_S;
-        let mut j = 0;
-        for (t, x) in time_s.iter().zip(&own) {
-            let at = t - shift_s;
-            while j + 1 < time_s.len() && time_s[j + 1] <= at {
-                j += 1;
-            }
-            if j + 1 >= time_s.len() || time_s[j] > at {
-                continue;
-            }
-            let width_s = time_s[j + 1] - time_s[j];
-            if width_s > 3.0 * usual_s {
-                continue;
-            }
-            let y = other[j] + (other[j + 1] - other[j]) * ((at - time_s[j]) / width_s);
-            let block = (((t - start_s) / block_s) as usize).min(blocks - 1);
-            let sum = &mut sums[block * shifts + slot];
-            sum[0] += x.norm_squared();
-            sum[1] += y.norm_squared();
-            sum[2] += x.dot(&y);
-        }
-    }
-    let of = |blocks: std::ops::Range<usize>, slot: &dyn Fn(usize) -> i32| -> [f64; 3] {
-        let mut total = [0.0; 3];
-        for block in blocks {
-            let place = (slot(block) + most).clamp(0, 2 * most) as usize;
-            total
-                .iter_mut()
-                .zip(sums[block * shifts + place])
-                .for_each(|(total, sum)| *total += sum);
-        }
-        total
-    };
-    let fit = |s: [f64; 3]| {
-        if s[2] > 0.0 { s[2] * s[2] / (s[0] * s[1]).max(f64::MIN_POSITIVE) } else { 0.0 }
-    };
+    let all = Blocks::new(time_s, own, other)?;
+    let blocks = all.blocks;
     let mut line = 0.0_f64;
     for ppm in (-SKEW_MAX_PPM..=SKEW_MAX_PPM).step_by(SKEW_STEP_PPM as usize) {
-        let slope = f64::from(ppm) * 1e-6 * block_s / SHIFT_STEP_S;
+        let slope = f64::from(ppm) * 1e-6 * all.block_s / SHIFT_STEP_S;
         let run = |block: usize| (slope * (block as f64 - 0.5 * blocks as f64)).round() as i32;
-        for shift in -most..=most {
-            line = line.max(fit(of(0..blocks, &|block| shift + run(block))));
+        for shift in -SHIFTS..=SHIFTS {
+            line = line.max(all.fit(0..blocks, &|block| shift + run(block)));
         }
     }
-    let best_shift = |range: std::ops::Range<usize>| {
-        let all = (-most..=most).map(|shift| (fit(of(range.clone(), &|_| shift)), shift));
-        all.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0))
+    let best_shift = |range: Range<usize>| {
+        let fits = (-SHIFTS..=SHIFTS).map(|shift| (all.fit(range.clone(), &|_| shift), shift));
+        fits.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0))
     };
     let (mut stepped, mut found) = (0.0, None);
     for cut in SIDE_MIN..=blocks - SIDE_MIN {
         let ((before, s0), (after, s1)) = (best_shift(0..cut), best_shift(cut..blocks));
-        let both = fit(of(0..blocks, &|block| if block < cut { s0 } else { s1 }));
+        let both = all.fit(0..blocks, &|block| if block < cut { s0 } else { s1 });
         if both > stepped {
             stepped = both;
-            let sides = before.min(after);
-            let is_right =
-                |shift: i32| (RIGHT_S.0..=RIGHT_S.1).contains(&(f64::from(shift) * SHIFT_STEP_S));
-            let sides = if is_right(s0) || is_right(s1) { sides } else { 0.0 };
-            found =
-                Some((sides, f64::from(s1 - s0) * SHIFT_STEP_S, start_s + cut as f64 * block_s));
+            found = Some((before.min(after), s0, s1, cut));
         }
     }
-    let (sides, by_s, at_s) = found?;
+    let (sides, s0, s1, cut) = found?;
+    let by_s = f64::from(s1 - s0) * SHIFT_STEP_S;
+    let is_right =
+        |shift: i32| (RIGHT_S.0..=RIGHT_S.1).contains(&(f64::from(shift) * SHIFT_STEP_S));
     let f = time_s.len() as f64 / SAMPLES_ALIKE * (stepped - line) / (1.0 - stepped).max(1e-6);
     let is_real = f > bar.f
+        && (is_right(s0) || is_right(s1))
         && sides > bar.fit * bar.fit
         && by_s.abs() > bar.by_s
         && (1.0 - stepped <= bar.left * (1.0 - line) || stepped >= bar.explains * line);
-    is_real.then_some(Step { by_s, at_s })
+    // What is slow and comes back looks alike at other times, too, and a force that is missing moves
+    // it.
+    let is_quick = || {
+        let quick = Blocks::new(time_s, &changes(time_s, own), &changes(time_s, other))?;
+        let at = |shift: &dyn Fn(usize) -> i32| quick.fit(0..blocks, shift);
+        let one = at(&|_| s0).max(at(&|_| s1));
+        Some(at(&|block| if block < cut { s0 } else { s1 }) > one)
+    };
+    let step = || Step { by_s, at_s: time_s[0] + cut as f64 * all.block_s };
+    (is_real && (!bar.quick || is_quick()?)).then(step)
+}
+
+/// What two sources have in common, by block of the flight and by how much later the first is
+/// taken.
+struct Blocks {
+    block_s: f64,
+    blocks: usize,
+    /// Of each block and shift: sums of own^2, other^2 and their product.
+    sums: Vec<[f64; 3]>,
+}
+
+impl Blocks {
+    /// None where the flight is too short, or a source has no value at some time.
+    fn new(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>]) -> Option<Self> {
+        let (own, other) = (centred(own), centred(other));
+        // Where a model has no finite answer, times are not known.
+        if own.len() != time_s.len() || other.len() != time_s.len() {
+            return None;
+        }
+        let (start_s, end_s) = (*time_s.first()?, *time_s.last()?);
+        let block_s = BLOCK_S.max((end_s - start_s) / BLOCKS_MAX);
+        let blocks = ((end_s - start_s) / block_s) as usize;
+        if blocks < 2 * SIDE_MIN {
+            return None;
+        }
+        let mut sums = vec![[0.0; 3]; blocks * SLOTS];
+        let usual_s = (end_s - start_s) / time_s.len() as f64;
+        for (slot, shift) in (-SHIFTS..=SHIFTS).enumerate() {
+            let shift_s = f64::from(shift) * SHIFT_STEP_S;
+            let mut j = 0;
+            for (t, x) in time_s.iter().zip(&own) {
+                let at = t - shift_s;
+                while j + 1 < time_s.len() && time_s[j + 1] <= at {
+                    j += 1;
+                }
+                if j + 1 >= time_s.len() || time_s[j] > at {
+                    continue;
+                }
+                let width_s = time_s[j + 1] - time_s[j];
+                if width_s > 3.0 * usual_s {
+                    continue;
+                }
+                let y = other[j] + (other[j + 1] - other[j]) * ((at - time_s[j]) / width_s);
+                let block = (((t - start_s) / block_s) as usize).min(blocks - 1);
+                let sum = &mut sums[block * SLOTS + slot];
+                sum[0] += x.norm_squared();
+                sum[1] += y.norm_squared();
+                sum[2] += x.dot(&y);
+            }
+        }
+        Some(Self { block_s, blocks, sums })
+    }
+
+    /// R^2 over some blocks, each at its shift; 0 where the two go against each other.
+    fn fit(&self, blocks: Range<usize>, shift: &dyn Fn(usize) -> i32) -> f64 {
+        let mut s = [0.0; 3];
+        for block in blocks {
+            let slot = (shift(block) + SHIFTS).clamp(0, 2 * SHIFTS) as usize;
+            s.iter_mut().zip(self.sums[block * SLOTS + slot]).for_each(|(s, own)| *s += own);
+        }
+        if s[2] > 0.0 { s[2] * s[2] / (s[0] * s[1]).max(f64::MIN_POSITIVE) } else { 0.0 }
+    }
+}
+
+/// By how much each value differs from the one a tenth of a second before; the first ones by
+/// nothing.
+fn changes(time_s: &[f64], values: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let mut before = 0;
+    let change = |(t, value): (&f64, &Vector3<f64>)| {
+        while t - time_s[before] > QUICK_S {
+            before += 1;
+        }
+        value - values[before]
+    };
+    time_s.iter().zip(values).map(change).collect()
 }
 
 /// About the mean.
