@@ -101,7 +101,7 @@ pub(super) fn steps(flight: &Flight, residual: &[f64]) -> Found {
 /// it.
 fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], bar: &Bar) -> Option<Step> {
     let all = Blocks::new(time_s, own, other)?;
-    let blocks = all.blocks;
+    let blocks = all.count;
     let mut line = 0.0_f64;
     for ppm in (-SKEW_MAX_PPM..=SKEW_MAX_PPM).step_by(SKEW_STEP_PPM as usize) {
         let slope = f64::from(ppm) * 1e-6 * all.block_s / SHIFT_STEP_S;
@@ -149,7 +149,7 @@ fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], bar: &Bar)
 /// taken.
 struct Blocks {
     block_s: f64,
-    blocks: usize,
+    count: usize,
     /// Of each block and shift: sums of own^2, other^2 and their product.
     sums: Vec<[f64; 3]>,
 }
@@ -164,11 +164,11 @@ impl Blocks {
         }
         let (start_s, end_s) = (*time_s.first()?, *time_s.last()?);
         let block_s = BLOCK_S.max((end_s - start_s) / BLOCKS_MAX);
-        let blocks = ((end_s - start_s) / block_s) as usize;
-        if blocks < 2 * SIDE_MIN {
+        let count = ((end_s - start_s) / block_s) as usize;
+        if count < 2 * SIDE_MIN {
             return None;
         }
-        let mut sums = vec![[0.0; 3]; blocks * SLOTS];
+        let mut sums = vec![[0.0; 3]; count * SLOTS];
         let usual_s = (end_s - start_s) / time_s.len() as f64;
         for (slot, shift) in (-SHIFTS..=SHIFTS).enumerate() {
             let shift_s = f64::from(shift) * SHIFT_STEP_S;
@@ -186,14 +186,14 @@ impl Blocks {
                     continue;
                 }
                 let y = other[j] + (other[j + 1] - other[j]) * ((at - time_s[j]) / width_s);
-                let block = (((t - start_s) / block_s) as usize).min(blocks - 1);
+                let block = (((t - start_s) / block_s) as usize).min(count - 1);
                 let sum = &mut sums[block * SLOTS + slot];
                 sum[0] += x.norm_squared();
                 sum[1] += y.norm_squared();
                 sum[2] += x.dot(&y);
             }
         }
-        Some(Self { block_s, blocks, sums })
+        Some(Self { block_s, count, sums })
     }
 
     /// R^2 over some blocks, each at its shift; 0 where the two go against each other.
