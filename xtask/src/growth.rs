@@ -16,7 +16,7 @@ const FLIGHTS: [u32; 4] = [10, 25, 50, 100];
 const STREAM_MAX_MB: f64 = 200.0;
 /// Most memory of `gap run` with 50 flights, MB; more flights, in proportion.
 const GAP_MAX_MB: f64 = 1000.0;
-/// How far memory may grow beyond a straight line.
+/// How far memory may lie beside the straight line of its row.
 const LINEAR_MAX: f64 = 1.2;
 /// Samples a second of a table that is imported.
 const ROWS_HZ: u32 = 100;
@@ -183,29 +183,41 @@ fn children_of(stat: &str) -> Option<f64> {
     Some(ticks / TICKS_HZ)
 }
 
-/// By how much two costs differ more than their sizes.
-fn beside_linear(row: &Row, i: usize, of: fn(&Cost) -> f64) -> Option<f64> {
-    let (before, now) = (row.costs.get(i.checked_sub(1)?)?, row.costs.get(i)?);
-    let sizes = f64::from(now.0) / f64::from(before.0);
-    (of(&before.1) > 0.0).then(|| of(&now.1) / of(&before.1) / sizes)
+/// Every cost of a row beside the straight line `start + slope size` that fits the row best by
+/// ratio. A start below zero would make room for growth faster than the size, so there is none.
+fn beside_line(row: &Row, of: fn(&Cost) -> f64) -> Vec<f64> {
+    // What takes less than a tick of the system's clock counts as one.
+    let points =
+        || row.costs.iter().map(|(size, cost)| (f64::from(*size), of(cost).max(1.0 / TICKS_HZ)));
+    // Least squares of 1 by (1, size) / cost.
+    let sum = |f: fn(f64, f64) -> f64| points().map(|(n, c)| f(n, c)).sum::<f64>();
+    let (one, size) = (sum(|_, c| 1.0 / c), sum(|n, c| n / c));
+    let (ones, both, sizes) =
+        (sum(|_, c| 1.0 / (c * c)), sum(|n, c| n / (c * c)), sum(|n, c| n * n / (c * c)));
+    let determinant = ones * sizes - both * both;
+    let start = (one * sizes - both * size) / determinant;
+    let slope = (ones * size - both * one) / determinant;
+    let (start, slope) = match (start >= 0.0, slope >= 0.0) {
+        (true, true) => (start, slope),
+        (false, _) => (0.0, size / sizes),
+        (true, false) => (one / ones, 0.0),
+    };
+    points().map(|(n, c)| c / (start + slope * n)).collect()
 }
 
 fn table(rows: &[Row]) -> String {
     let mut text = format!(
-        "{:<8} {:>12} {:>9} {:>14} {:>9} {:>14}\n",
-        "command", "size", "user s", "beside linear", "peak MB", "beside linear"
+        "{:<8} {:>12} {:>9} {:>12} {:>9} {:>12}\n",
+        "command", "size", "user s", "beside line", "peak MB", "beside line"
     );
-    let factor = |factor: Option<f64>| factor.map_or("-".to_owned(), |x| format!("{x:.2}"));
     for row in rows {
-        for (i, (size, cost)) in row.costs.iter().enumerate() {
-            let (time, memory) = (
-                factor(beside_linear(row, i, |cost| cost.user_s)),
-                factor(beside_linear(row, i, |cost| cost.memory_mb)),
-            );
+        let times = beside_line(row, |cost| cost.user_s);
+        let memories = beside_line(row, |cost| cost.memory_mb);
+        for (((size, cost), time), memory) in row.costs.iter().zip(times).zip(memories) {
             let size = format!("{size} {}", row.unit);
             let _ = writeln!(
                 text,
-                "{:<8} {size:>12} {:>9.2} {time:>14} {:>9.0} {memory:>14}",
+                "{:<8} {size:>12} {:>9.2} {time:>12.2} {:>9.0} {memory:>12.2}",
                 row.what, cost.user_s, cost.memory_mb
             );
         }
@@ -216,7 +228,8 @@ fn table(rows: &[Row]) -> String {
 /// Where memory is beyond its bounds.
 fn beyond(row: &Row) -> Vec<String> {
     let mut problems = Vec::new();
-    for (i, (size, cost)) in row.costs.iter().enumerate() {
+    let factors = beside_line(row, |cost| cost.memory_mb);
+    for ((size, cost), factor) in row.costs.iter().zip(factors) {
         let most_mb = match row.what {
             "gap run" => GAP_MAX_MB * f64::from((*size).max(50)) / 50.0,
             "import" => f64::INFINITY,
@@ -226,9 +239,8 @@ fn beyond(row: &Row) -> Vec<String> {
         if cost.memory_mb > most_mb {
             problems.push(format!("{at}: {:.0} MB, at most {most_mb:.0}", cost.memory_mb));
         }
-        let factor = beside_linear(row, i, |cost| cost.memory_mb);
-        if let Some(factor) = factor.filter(|factor| *factor > LINEAR_MAX) {
-            problems.push(format!("{at}: memory is {factor:.2} times a straight line"));
+        if factor > LINEAR_MAX {
+            problems.push(format!("{at}: memory is {factor:.2} times its row's straight line"));
         }
     }
     problems
@@ -253,8 +265,21 @@ mod tests {
         let row = |what, costs| Row { what, unit: "min", costs };
         assert!(beyond(&row("fly", vec![(1, cost(40.0)), (10, cost(90.0))])).is_empty());
         assert_eq!(beyond(&row("replay", vec![(1, cost(40.0)), (10, cost(201.0))])).len(), 1);
-        assert_eq!(beyond(&row("import", vec![(1, cost(40.0)), (2, cost(97.0))])).len(), 1);
         let gap = vec![(50, cost(900.0)), (100, cost(1900.0))];
         assert!(beyond(&row("gap run", gap)).is_empty());
+    }
+
+    #[test]
+    fn a_line_may_start_above_zero_and_growth_faster_than_the_size_is_found() {
+        let row = |of: fn(f64) -> f64| {
+            let cost = |n: u32| Cost { user_s: 1.0, memory_mb: of(f64::from(n)) };
+            Row { what: "import", unit: "min", costs: MINUTES.map(|n| (n, cost(n))).to_vec() }
+        };
+        let memory = |cost: &Cost| cost.memory_mb;
+        for of in [|n| 40.0 + n, |_| 40.0, |n| 3.0 * n] {
+            assert!(beside_line(&row(of), memory).iter().all(|x| (x - 1.0).abs() < 1e-9));
+        }
+        assert!(!beyond(&row(|n| n * n)).is_empty());
+        assert!(!beyond(&row(|n| n.powf(1.2))).is_empty());
     }
 }

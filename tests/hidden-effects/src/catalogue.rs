@@ -187,7 +187,7 @@ pub const CATALOGUE: &[Entry] = &[
     entry(
         "linear_drag",
         Kind::Drag,
-        &["anisotropic"],
+        &["anisotropic", "at_rotors"],
         &[extensive("extra_drag_n_s_per_m", 0.04, 0.25)],
     ),
     entry(
@@ -225,10 +225,10 @@ pub const CATALOGUE: &[Entry] = &[
     entry(
         "translational_lift",
         Kind::Lift,
-        &["linear", "quadratic"],
+        &["linear", "quadratic", "additive"],
         &[size("gain_s2_per_m2", 6e-4, 3e-3)],
     ),
-    entry("axial_inflow", Kind::Lift, &[], &[size("gain_s_per_m", 0.012, 0.06)]),
+    entry("axial_inflow", Kind::Lift, &["at_rotors"], &[size("gain_s_per_m", 0.012, 0.06)]),
     flapping_moment::ENTRY,
     entry("rotor_gyro_torque", Kind::Yaw, &[], &[extensive("rotor_inertia_kg_m2", 4e-6, 2e-5)]),
     entry("yaw_torque_coeff", Kind::Yaw, &[], &[signed("torque_fraction", 0.12, 0.4)]),

@@ -2,22 +2,18 @@
 #![cfg(unix)]
 
 use super::support::Folder;
-use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-use rustix::termios::{Winsize, tcsetwinsize};
-use std::fs::{File, OpenOptions};
+use nix::pty::{Winsize, openpty};
+use std::fs::File;
 use std::io::Read;
 use std::process::{Command, Stdio};
 
 /// A terminal: the end that a user looks at, and the one that a program writes to.
 fn terminal() -> (File, File) {
-    let user = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
-    grantpt(&user).unwrap();
-    unlockpt(&user).unwrap();
-    let name = ptsname(&user, Vec::new()).unwrap().into_string().unwrap();
-    let program = OpenOptions::new().read(true).write(true).open(name).unwrap();
     let size = Winsize { ws_row: 30, ws_col: 100, ws_xpixel: 0, ws_ypixel: 0 };
-    tcsetwinsize(&program, size).unwrap();
-    (File::from(user), program)
+    let ends = openpty(Some(&size), None).unwrap();
+    // Copies, which other children do not inherit, unlike what the system gives.
+    let [user, program] = [ends.master, ends.slave].map(|end| end.try_clone().unwrap());
+    (File::from(user), File::from(program))
 }
 
 /// What a command writes to stderr where that is a terminal.

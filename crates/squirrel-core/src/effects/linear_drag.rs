@@ -2,17 +2,22 @@
 //!
 //! Form `anisotropic`: `F -= (D (1 + e) u, D (1 - e) v, D_z w)`, for rotors or an airframe longer
 //! than wide (Svacha et al. 2017 identify such a drag matrix).
+//!
+//! Form `at_rotors`: each rotor's part acts at its hub and grows with its speed, `(D, D, D_z)` with
+//! all at hover; see [`at_rotors`].
 
 use super::{
-    Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is,
+    Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent,
+    at_rotors, is,
 };
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
 use crate::numbers;
-use crate::vehicle::Vehicle;
+use crate::vehicle::{MAX_ROTORS, Vehicle};
 
 const ANISOTROPIC: usize = 1;
+const AT_ROTORS: usize = 2;
 
 /// Drag in the rotor plane on top of the vehicle's own.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,8 +33,8 @@ impl<T: Real> Effect<T> for LinearDrag<T> {
         EffectParameter::signed("extra_drag_z_n_s_per_m", 0.04, 0.25)
             .growing_with(Scale::Mass)
             .declared(Declared::LinearDrag(2))
-            .only_in(&["anisotropic"]),
-        EffectParameter::form(&["isotropic", "anisotropic"]),
+            .only_in(&["anisotropic", "at_rotors"]),
+        EffectParameter::form(&["isotropic", "anisotropic", "at_rotors"]),
     ];
     const WORDS: Words = Words {
         what: "drag that grows with speed",
@@ -44,31 +49,44 @@ numbers! {
     /// Drag over speed, N s/m.
     Numbers {
         /// Along each axis.
-        slope [3]
+        slope [3],
+        /// Of each rotor over its speed, along each axis, N s^2/(m rad).
+        per_rotor [3],
+        /// Where the hubs are, m.
+        hub_m [MAX_ROTORS] [3]
     }
 }
 
 impl<T: Real> LinearDrag<T> {
-    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
-        let [drag, anisotropy, drag_z, form] = self.0;
-        Numbers {
-            slope: if is(form, ANISOTROPIC) {
-                [drag * (T::one() + anisotropy), drag * (T::one() - anisotropy), drag_z]
-            } else {
-                [drag, drag, T::zero()]
-            },
+    pub(super) fn prepare(&self, vehicle: &Vehicle<T>) -> Numbers<T> {
+        let ([drag, anisotropy, drag_z, form], none) = (self.0, T::zero());
+        let out = Numbers::all(none);
+        if is(form, AT_ROTORS) {
+            let each = at_rotors::per_hover(vehicle);
+            let per_rotor = [drag * each, drag * each, drag_z * each];
+            return Numbers { per_rotor, hub_m: at_rotors::hubs(vehicle), ..out };
         }
+        let slope = if is(form, ANISOTROPIC) {
+            [drag * (T::one() + anisotropy), drag * (T::one() - anisotropy), drag_z]
+        } else {
+            [drag, drag, none]
+        };
+        Numbers { slope, ..out }
     }
 }
 
 impl<L: Lane> Acts<L> for Numbers<L> {
     #[inline(always)]
-    fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
+    fn wrench(&self, at: &Situation<'_, L>, forms: Forms) -> BodyWrench<L> {
         let ([x, y, z], [u, v, w]) = (self.slope, at.flow.velocity);
-        BodyWrench::from_force([
+        let out = BodyWrench::from_force([
             absent::<L>() - x * u,
             absent::<L>() - y * v,
             absent::<L>() - z * w,
-        ])
+        ]);
+        if forms.has(AT_ROTORS) {
+            return out.plus(&at_rotors::wrench(at, &self.hub_m, &self.per_rotor));
+        }
+        out
     }
 }

@@ -20,6 +20,7 @@ mod accel_scale;
 mod actuation_latency;
 mod added_mass;
 mod angular_damping;
+mod at_rotors;
 mod axial_inflow;
 mod battery_sag;
 mod catalogue;

@@ -3,6 +3,7 @@
 use super::*;
 use crate::aero::Air;
 use crate::frames::Wrench;
+use crate::math::GRAVITY_M_S2;
 use crate::vehicle::fixtures::squirrel;
 use crate::vehicle::{MAX_ROTORS, RotorAir, Vehicle, Wing};
 use nalgebra::Vector3;
@@ -309,6 +310,9 @@ fn the_other_forms_by_hand() {
     );
     close(factor("translational_lift", "quadratic", &[1e-3]), 1.013, "quadratic lift");
     close(factor("axial_inflow", "quadratic", &[0.03, -0.01]), 1.02, "inflow");
+    let lift = wrench("translational_lift", "additive", &[1e-3]);
+    close(lift.force.vector.z, -0.013 * 0.548 * GRAVITY_M_S2, "added lift");
+    assert_eq!(lift.moment.vector, Vector3::zeros());
     let damped = wrench("angular_damping", "quadratic", &[0.0, 0.01]).moment.vector;
     assert!((damped - Vector3::new(-1.6e-3, 0.9e-3, -0.2e-3)).norm() < 1e-12, "{damped}");
     let flap = wrench("flapping_moment", "saturating", &[2e-3, 13.0_f64.sqrt()]).moment.vector;
@@ -403,7 +407,7 @@ fn forms_choose_among_parameters() {
     };
     assert_eq!(
         forms(Effects::<f64>::parameters("translational_lift").unwrap()),
-        ["saturating", "linear", "quadratic"]
+        ["saturating", "linear", "quadratic", "additive"]
     );
     assert_eq!(keys("translational_lift", "saturating"), ["gain_s2_per_m2"]);
     assert_eq!(keys("translational_lift", "linear"), ["gain_s_per_m"]);
@@ -423,6 +427,55 @@ fn forms_choose_among_parameters() {
             );
         }
     }
+}
+
+/// The forms at the rotors' hubs are the standard ones where nothing turns, and damp turning as
+/// forces at the ends of arms do.
+#[test]
+fn drag_and_inflow_at_the_rotors_damp_turning() {
+    let vehicle = vehicle();
+    let rotors = vehicle.rotors();
+    let thrust: f64 = vehicle.rotor_wrench_per_speed_squared().thrust.iter().sum();
+    let hover = (vehicle.weight_n() / thrust).sqrt();
+    let at = |effects: &Effects<f64>, flow: &Airflow<f64>, times: f64| {
+        let acting = Acting::new(effects, &vehicle);
+        let situation = Situation {
+            flow,
+            omega: &flow.omega,
+            thrust_n: 5.0,
+            rotor_speed: &[times * hover; 4],
+            thrust_factor: 1.0,
+            force: [0.0; 3],
+            wing_force: [0.0; 3],
+            rotor_spin: [0.0; 2],
+            wings: &flat_plate::Pair::new(&WING),
+            deployment: [0.0; 2],
+        };
+        let wrench = acting.numbers().wrench(acting.present(), &situation);
+        (Vector3::from(wrench.force), Vector3::from(wrench.moment))
+    };
+    let flow = |velocity: Vector3<f64>, omega: Vector3<f64>| {
+        Airflow::from(&Air::new(In::new(velocity), In::new(omega)))
+    };
+    let straight = flow(Vector3::new(3.0, -2.0, 1.0), Vector3::zeros());
+    let height: f64 = rotors.iter().map(|r| r.position.vector.z).sum::<f64>() / 4.0;
+
+    let drag = formed("linear_drag", "at_rotors", &[0.1, 0.0, 0.05]);
+    let (force, moment) = at(&drag, &straight, 1.0);
+    assert!((force - Vector3::new(-0.3, 0.2, -0.05)).norm() < 1e-12, "{force}");
+    assert!((moment - Vector3::z().cross(&force) * height).norm() < 1e-12, "{moment}");
+    close(at(&drag, &straight, 1.2).0.x, -0.36, "with the rotors' speed");
+    let yawing = flow(Vector3::zeros(), Vector3::z());
+    let arms: f64 = rotors.iter().map(|r| r.position.vector.xy().norm_squared()).sum::<f64>() / 4.0;
+    close(at(&drag, &yawing, 1.0).1.z, -0.1 * arms, "yaw is damped");
+
+    let inflow = formed("axial_inflow", "at_rotors", &[0.03]);
+    let (force, moment) = at(&inflow, &straight, 1.0);
+    close(force.z, -0.03 * vehicle.weight_n(), "as the standard form");
+    assert!(moment.norm() < 1e-12, "{moment}");
+    let rolling = flow(Vector3::zeros(), Vector3::x());
+    let arms: f64 = rotors.iter().map(|r| r.position.vector.y.powi(2)).sum::<f64>() / 4.0;
+    close(at(&inflow, &rolling, 1.0).1.x, -0.03 * vehicle.weight_n() * arms, "roll is damped");
 }
 
 /// A number of the vehicle does what the effect of its name does, and the effect adds to it.

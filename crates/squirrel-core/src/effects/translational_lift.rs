@@ -1,10 +1,11 @@
 //! Translational lift: `T <- T (1 + k V_h^2 / (1 + 0.004 V_h^2))`, `V_h` the airspeed in the rotor
 //! plane.
 //!
-//! Form `linear`: `T (1 + k V_h)`. Form `quadratic`: `T (1 + k V_h^2)`, without saturation.
+//! Form `linear`: `T (1 + k V_h)`. Form `quadratic`: `T (1 + k V_h^2)`, without saturation. Form
+//! `additive`: `T + k V_h^2 m g`, whatever the thrust, as blade elements of fixed pitch have it.
 
-use super::{Acts, Declared, Effect, EffectParameter, Forms, Shown, Words, is};
-use crate::aero::Airflow;
+use super::{Acts, Declared, Effect, EffectParameter, Forms, Shown, Situation, Words, absent, is};
+use crate::aero::{Airflow, BodyWrench};
 use crate::lane::Lane;
 use crate::math::Real;
 use crate::numbers;
@@ -12,6 +13,7 @@ use crate::vehicle::Vehicle;
 
 const LINEAR: usize = 1;
 const QUADRATIC: usize = 2;
+const ADDITIVE: usize = 3;
 /// Where the standard form saturates, s^2/m^2.
 const SATURATION: f64 = 0.004;
 
@@ -24,9 +26,9 @@ impl<T: Real> Effect<T> for TranslationalLift<T> {
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed("gain_s2_per_m2", 6e-4, 3e-3)
             .declared(Declared::TranslationalLift)
-            .only_in(&["saturating", "quadratic"]),
+            .only_in(&["saturating", "quadratic", "additive"]),
         EffectParameter::signed("gain_s_per_m", 3e-3, 0.02).only_in(&["linear"]),
-        EffectParameter::form(&["saturating", "linear", "quadratic"]),
+        EffectParameter::form(&["saturating", "linear", "quadratic", "additive"]),
     ];
     const WORDS: Words = Words {
         what: "lift in forward flight",
@@ -49,22 +51,28 @@ numbers! {
         /// The same without an end.
         endless,
         /// Over speed, s/m.
-        linear
+        linear,
+        /// Lift over speed squared, N s^2/m^2.
+        added
     }
 }
 
 impl<T: Real> TranslationalLift<T> {
     pub(super) fn prepare(&self, vehicle: &Vehicle<T>) -> Numbers<T> {
         let [extra, linear, form] = self.0;
-        let (gain, none) =
-            (vehicle.parameters().propulsion.air.translational_lift_s2_per_m2, T::zero());
+        let own = vehicle.parameters().propulsion.air.translational_lift_s2_per_m2;
+        let mut out = Numbers::all(T::zero());
+        out.gain = own;
         if is(form, LINEAR) {
-            Numbers { gain, endless: none, linear }
+            out.linear = linear;
         } else if is(form, QUADRATIC) {
-            Numbers { gain, endless: extra, linear: none }
+            out.endless = extra;
+        } else if is(form, ADDITIVE) {
+            out.added = extra * vehicle.weight_n();
         } else {
-            Numbers { gain: gain + extra, endless: none, linear: none }
+            out.gain = own + extra;
         }
+        out
     }
 }
 
@@ -81,5 +89,13 @@ impl<L: Lane> Acts<L> for Numbers<L> {
             factor = factor + self.linear * across.root();
         }
         factor
+    }
+    #[inline(always)]
+    fn wrench(&self, at: &Situation<'_, L>, forms: Forms) -> BodyWrench<L> {
+        let ([u, v, _], mut force) = (at.flow.velocity, [absent::<L>(); 3]);
+        if forms.has(ADDITIVE) {
+            force[2] = force[2] - self.added * (u * u + v * v);
+        }
+        BodyWrench::from_force(force)
     }
 }

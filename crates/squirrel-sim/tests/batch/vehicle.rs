@@ -406,7 +406,10 @@ fn another_form_may_come_later() {
         ("battery_sag", 2),
         ("flapping_moment", 1),
         ("linear_drag", 1),
+        ("linear_drag", 2),
+        ("axial_inflow", 2),
         ("translational_lift", 1),
+        ("translational_lift", 3),
     ] {
         let (first, other) = (formed(name, 0), formed(name, form));
         let made = Batch::with(&[first.clone(), other.clone()], Settings::default()).unwrap();

@@ -16,6 +16,8 @@ pub(super) enum Lift {
     Linear(f64),
     /// `k V^2`
     Quadratic(f64),
+    /// A force `k V^2` of the weight, whatever the thrust
+    Additive(f64),
 }
 
 /// A thrust gain over height.
@@ -53,6 +55,10 @@ pub(super) struct Gust {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Extras {
     pub(super) linear_drag: Vector3<f64>,
+    /// Drag at the rotors' hubs along each axis, all rotors at hover, N s/m.
+    pub(super) hub_drag: Vector3<f64>,
+    /// Of the weight, s/m.
+    pub(super) hub_inflow: f64,
     pub(super) drag_area: Vector3<f64>,
     pub(super) wind_ned: Vector3<f64>,
     pub(super) log_wind: bool,
@@ -101,6 +107,8 @@ impl Extras {
     pub(super) fn new(effects: &[HiddenEffect]) -> Self {
         let mut extras = Self {
             linear_drag: Vector3::zeros(),
+            hub_drag: Vector3::zeros(),
+            hub_inflow: 0.0,
             drag_area: Vector3::zeros(),
             wind_ned: Vector3::zeros(),
             log_wind: false,
@@ -147,6 +155,9 @@ impl Extras {
         let form = effect.form.as_str();
         let standard = form == "standard";
         match effect.name.as_str() {
+            "linear_drag" if form == "at_rotors" => {
+                self.hub_drag = x("extra_drag_n_s_per_m") * Vector3::new(1.0, 1.0, 0.3);
+            }
             "linear_drag" => {
                 let shape = if standard { [1.0, 1.0, 0.0] } else { ANISOTROPIC_LINEAR };
                 self.linear_drag = x("extra_drag_n_s_per_m") * Vector3::from(shape);
@@ -206,9 +217,11 @@ impl Extras {
                     // The same gain at 6 m/s.
                     "linear" => Lift::Linear(k * 6.0 / (1.0 + 0.004 * 36.0)),
                     "quadratic" => Lift::Quadratic(k),
+                    "additive" => Lift::Additive(k),
                     _ => Lift::Saturating(k),
                 };
             }
+            "axial_inflow" if form == "at_rotors" => self.hub_inflow = x("gain_s_per_m"),
             "axial_inflow" => self.inflow = x("gain_s_per_m"),
             "rotor_gyro_torque" => self.rotor_inertia = x("rotor_inertia_kg_m2"),
             "yaw_torque_coeff" => {

@@ -69,7 +69,7 @@ impl World {
 
     fn lift_and_ground(&self, across: f64, down: f64, height_m: f64) -> f64 {
         let lift = match self.extras.lift {
-            Lift::None => 0.0,
+            Lift::None | Lift::Additive(_) => 0.0,
             Lift::Saturating(k) => k * across * across / (1.0 + 0.004 * across * across),
             Lift::Linear(k) => k * across,
             Lift::Quadratic(k) => k * across * across,
@@ -163,11 +163,18 @@ impl World {
         let (mut thrust, mut spin, mut spin_rate) = (0.0, 0.0, 0.0);
         let mut rotor_rates = state.rotors * 0.0;
         let mut rotors = Rotors::default();
+        let weight_n = a.mass_kg * GRAVITY_M_S2;
+        let hub_drag = x.hub_drag + Vector3::z() * (x.hub_inflow * weight_n);
+        let hover_rad_s = a.hover_command() * a.speed_max_rad_s * a.rotors.len() as f64;
         for (i, rotor) in a.rotors.iter().enumerate() {
             let weak = if unknown.weak_rotor == Some(i) { 1.0 - unknown.weak_loss } else { 1.0 };
             let square = state.rotors[i] * state.rotors[i] * weak;
             let t = rotor.thrust_coefficient_n_s2 * x.thrust[i] * square * factor;
             thrust += t;
+            let hub = v + omega.cross(&rotor.position_body_m);
+            let pull = -hub_drag.component_mul(&hub) * (state.rotors[i] / hover_rad_s);
+            force += pull;
+            moment += rotor.position_body_m.cross(&pull);
             rotors.push(Jet { position: rotor.position_body_m, thrust_n: t });
             moment += rotor.position_body_m.cross(&Vector3::new(0.0, 0.0, -t));
             moment.z += rotor.yaw_sign * rotor.torque_coefficient_n_m_s2 * x.torque[i] * square;
@@ -177,6 +184,9 @@ impl World {
             spin_rate -= rotor.yaw_sign * rotor_rates[i];
         }
         force.z -= thrust;
+        if let Lift::Additive(k) = x.lift {
+            force.z -= k * (v.x * v.x + v.y * v.y) * weight_n;
+        }
         let half_density = 0.5 * AIR_DENSITY_KG_M3 * speed;
         force -= (a.drag_n_s_per_m + x.linear_drag).component_mul(&v);
         force -= half_density * (x.drag_area.add_scalar(a.drag_area_m2)).component_mul(&v);
@@ -198,7 +208,7 @@ impl World {
                 -thrust * Vector3::new(x.tilt.x, x.tilt.y, 1.0),
                 rotors.all().iter().map(pushed).sum(),
             ],
-            weight_n: a.mass_kg * GRAVITY_M_S2,
+            weight_n,
             propeller_radius_m: planform.propeller_radius_m,
             wings: Wings {
                 area_m2: a.wing_area_m2,

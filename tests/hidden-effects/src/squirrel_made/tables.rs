@@ -97,6 +97,9 @@ pub fn effect_table(effect: &HiddenEffect) -> String {
             more.push(("anisotropy", 0.3));
             more.push(("extra_drag_z_n_s_per_m", 0.2 * x("extra_drag_n_s_per_m")));
         }
+        ("linear_drag", "at_rotors") => {
+            more.push(("extra_drag_z_n_s_per_m", 0.3 * x("extra_drag_n_s_per_m")));
+        }
         ("quadratic_drag", "anisotropic") => {
             let area = x("extra_drag_area_m2");
             kept.insert("extra_drag_area_m2".to_owned(), Value::Number(0.9 * area));

@@ -155,6 +155,10 @@ fn of_effect(file: &VehicleFile, keeps: &Keeps, name: &str) -> Option<String> {
         "weak_rotor" => Some("all rotors alike: their mean".to_owned()),
         "linear_drag" => match (keeps.linear, form) {
             (Axes::None, _) => left_out(),
+            (_, "at_rotors") if keeps.pulls != Pulls::LinearAtHubs => {
+                Some("acts at the centre of mass: damps no turning".to_owned())
+            }
+            (_, "at_rotors") => None,
             (Axes::Alike, "isotropic" | "") => Some("acts along z, too".to_owned()),
             (Axes::Each, _) | (_, "isotropic" | "") => None,
             _ => Some("one number for x and y: the mean".to_owned()),
@@ -167,7 +171,7 @@ fn of_effect(file: &VehicleFile, keeps: &Keeps, name: &str) -> Option<String> {
         },
         "axial_inflow" if keeps.axial && form != "quadratic" => None,
         "axial_inflow" if keeps.axial => Some("only what is linear in speed".to_owned()),
-        "translational_lift" if keeps.lift && form == "quadratic" => None,
+        "translational_lift" if keeps.lift && matches!(form, "quadratic" | "additive") => None,
         "translational_lift" if keeps.lift => at_5(),
         "flapping_moment" if keeps.flapping && form != "saturating" => None,
         "flapping_moment" if keeps.flapping => at_5(),
