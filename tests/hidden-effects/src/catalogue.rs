@@ -225,7 +225,7 @@ pub const CATALOGUE: &[Entry] = &[
     entry(
         "translational_lift",
         Kind::Lift,
-        &["linear", "quadratic", "additive"],
+        &["linear", "quadratic", "at_rotors"],
         &[size("gain_s2_per_m2", 6e-4, 3e-3)],
     ),
     entry("axial_inflow", Kind::Lift, &["at_rotors"], &[size("gain_s_per_m", 0.012, 0.06)]),

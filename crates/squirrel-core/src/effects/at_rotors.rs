@@ -1,10 +1,11 @@
-//! Forces at the rotors' hubs, where the air comes by in another way than at the centre of mass: the
-//! forms `at_rotors` of effects.
+//! What acts at the rotors' hubs, where the air comes by in another way than at the centre of mass:
+//! the forms `at_rotors` of effects.
 //!
-//! Each is in proportion to the rotor's speed and to the velocity of the hub through the air,
-//! `F_i = -S w_i (v + omega x r_i)`, as blade elements have it for the force in the rotor plane and
-//! for what inflow takes of the thrust (Martin and Salaun, ICRA 2010; Bangura and Mahony, 2017). So
-//! it damps turning, too. With all rotors at the speed of hover the forces add up to `-n S w_h v`.
+//! Blade elements of fixed pitch have a force in the rotor plane, a loss of thrust to inflow and a
+//! flapping moment that go with the rotor's speed and the velocity of its hub through the air,
+//! `F_i = -S w_i (v + omega x r_i)`, and a lift that goes with the square of that velocity (Martin
+//! and Salaun, ICRA 2010; Bangura and Mahony, 2017). So they damp turning, too. With all rotors at
+//! the speed of hover and nothing turning they add up to the standard forms.
 
 use super::Situation;
 use crate::aero::BodyWrench;
@@ -35,18 +36,34 @@ pub(super) fn per_hover<T: Real>(vehicle: &Vehicle<T>) -> T {
 
 /// The wrench of all of them.
 ///
-/// * `slope` - `S` along each axis, N s^2/(m rad)
+/// * `one` - force and moment of a rotor at its hub, of its speed, rad/s, and of the hub's velocity
+///   through the air, m/s
 #[inline(always)]
 pub(super) fn wrench<L: Lane>(
     at: &Situation<'_, L>,
     hubs: &[[L; 3]; MAX_ROTORS],
-    slope: &[L; 3],
+    one: impl Fn(L, [L; 3]) -> BodyWrench<L>,
 ) -> BodyWrench<L> {
-    let (mut out, none) = (BodyWrench::zero(), L::of(0.0));
+    let mut out = BodyWrench::zero();
     for (hub, &speed) in hubs.iter().zip(at.rotor_speed) {
         let velocity = plus(&at.flow.velocity, &cross(&at.flow.omega, hub));
-        let force = core::array::from_fn(|k| none - slope[k] * speed * velocity[k]);
-        out = out.plus(&BodyWrench { force, moment: cross(hub, &force) });
+        let BodyWrench { force, moment } = one(speed, velocity);
+        out = out.plus(&BodyWrench { force, moment: plus(&moment, &cross(hub, &force)) });
     }
     out
+}
+
+/// The wrench of forces `-S w_i v_i`.
+///
+/// * `slope` - `S` along each axis, N s^2/(m rad)
+#[inline(always)]
+pub(super) fn drag<L: Lane>(
+    at: &Situation<'_, L>,
+    hubs: &[[L; 3]; MAX_ROTORS],
+    slope: &[L; 3],
+) -> BodyWrench<L> {
+    wrench(at, hubs, |speed, velocity| {
+        let pull = core::array::from_fn(|k| L::of(0.0) - slope[k] * speed * velocity[k]);
+        BodyWrench::from_force(pull)
+    })
 }

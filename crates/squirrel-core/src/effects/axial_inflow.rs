@@ -84,7 +84,7 @@ impl<L: Lane> Acts<L> for Numbers<L> {
     #[inline(always)]
     fn wrench(&self, at: &Situation<'_, L>, forms: Forms) -> BodyWrench<L> {
         if forms.has(AT_ROTORS) {
-            return at_rotors::wrench(at, &self.hub_m, &self.per_rotor);
+            return at_rotors::drag(at, &self.hub_m, &self.per_rotor);
         }
         BodyWrench::from_force([absent(); 3])
     }

@@ -85,7 +85,7 @@ impl<L: Lane> Acts<L> for Numbers<L> {
             absent::<L>() - z * w,
         ]);
         if forms.has(AT_ROTORS) {
-            return out.plus(&at_rotors::wrench(at, &self.hub_m, &self.per_rotor));
+            return out.plus(&at_rotors::drag(at, &self.hub_m, &self.per_rotor));
         }
         out
     }

@@ -3,7 +3,6 @@
 use super::*;
 use crate::aero::Air;
 use crate::frames::Wrench;
-use crate::math::GRAVITY_M_S2;
 use crate::vehicle::fixtures::squirrel;
 use crate::vehicle::{MAX_ROTORS, RotorAir, Vehicle, Wing};
 use nalgebra::Vector3;
@@ -310,9 +309,6 @@ fn the_other_forms_by_hand() {
     );
     close(factor("translational_lift", "quadratic", &[1e-3]), 1.013, "quadratic lift");
     close(factor("axial_inflow", "quadratic", &[0.03, -0.01]), 1.02, "inflow");
-    let lift = wrench("translational_lift", "additive", &[1e-3]);
-    close(lift.force.vector.z, -0.013 * 0.548 * GRAVITY_M_S2, "added lift");
-    assert_eq!(lift.moment.vector, Vector3::zeros());
     let damped = wrench("angular_damping", "quadratic", &[0.0, 0.01]).moment.vector;
     assert!((damped - Vector3::new(-1.6e-3, 0.9e-3, -0.2e-3)).norm() < 1e-12, "{damped}");
     let flap = wrench("flapping_moment", "saturating", &[2e-3, 13.0_f64.sqrt()]).moment.vector;
@@ -407,7 +403,7 @@ fn forms_choose_among_parameters() {
     };
     assert_eq!(
         forms(Effects::<f64>::parameters("translational_lift").unwrap()),
-        ["saturating", "linear", "quadratic", "additive"]
+        ["saturating", "linear", "quadratic", "at_rotors"]
     );
     assert_eq!(keys("translational_lift", "saturating"), ["gain_s2_per_m2"]);
     assert_eq!(keys("translational_lift", "linear"), ["gain_s_per_m"]);
@@ -432,7 +428,7 @@ fn forms_choose_among_parameters() {
 /// The forms at the rotors' hubs are the standard ones where nothing turns, and damp turning as
 /// forces at the ends of arms do.
 #[test]
-fn drag_and_inflow_at_the_rotors_damp_turning() {
+fn what_acts_at_the_rotors_damps_turning() {
     let vehicle = vehicle();
     let rotors = vehicle.rotors();
     let thrust: f64 = vehicle.rotor_wrench_per_speed_squared().thrust.iter().sum();
@@ -476,6 +472,20 @@ fn drag_and_inflow_at_the_rotors_damp_turning() {
     let rolling = flow(Vector3::zeros(), Vector3::x());
     let arms: f64 = rotors.iter().map(|r| r.position.vector.y.powi(2)).sum::<f64>() / 4.0;
     close(at(&inflow, &rolling, 1.0).1.x, -0.03 * vehicle.weight_n() * arms, "roll is damped");
+
+    let lift = formed("translational_lift", "at_rotors", &[1e-3]);
+    let (force, moment) = at(&lift, &straight, 1.5);
+    close(force.z, -0.013 * vehicle.weight_n(), "whatever the rotors' speed");
+    assert!(moment.norm() < 1e-12, "{moment}");
+    // The rotors on the side that comes forward lift more.
+    let turning = flow(Vector3::new(3.0, 0.0, 0.0), Vector3::z());
+    let rolls = 1e-3 * vehicle.weight_n() * 2.0 * 3.0 * arms;
+    close(at(&lift, &turning, 1.0).1.x, rolls, "a yawing disc rolls");
+
+    let flapping = formed("flapping_moment", "at_rotors", &[2e-3]);
+    let (force, moment) = at(&flapping, &straight, 1.2);
+    assert!(force.norm() < 1e-12, "{force}");
+    assert!((moment - Vector3::new(4e-3, 6e-3, 0.0) * 1.2).norm() < 1e-12, "{moment}");
 }
 
 /// A number of the vehicle does what the effect of its name does, and the effect adds to it.

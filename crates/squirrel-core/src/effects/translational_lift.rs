@@ -2,18 +2,21 @@
 //! plane.
 //!
 //! Form `linear`: `T (1 + k V_h)`. Form `quadratic`: `T (1 + k V_h^2)`, without saturation. Form
-//! `additive`: `T + k V_h^2 m g`, whatever the thrust, as blade elements of fixed pitch have it.
+//! `at_rotors`: `T + k V_h^2 m g` whatever the thrust, of each rotor its part by the air at its hub;
+//! see [`at_rotors`].
 
-use super::{Acts, Declared, Effect, EffectParameter, Forms, Shown, Situation, Words, absent, is};
+use super::{
+    Acts, Declared, Effect, EffectParameter, Forms, Shown, Situation, Words, absent, at_rotors, is,
+};
 use crate::aero::{Airflow, BodyWrench};
 use crate::lane::Lane;
-use crate::math::Real;
+use crate::math::{Real, real};
 use crate::numbers;
-use crate::vehicle::Vehicle;
+use crate::vehicle::{MAX_ROTORS, Vehicle};
 
 const LINEAR: usize = 1;
 const QUADRATIC: usize = 2;
-const ADDITIVE: usize = 3;
+const AT_ROTORS: usize = 3;
 /// Where the standard form saturates, s^2/m^2.
 const SATURATION: f64 = 0.004;
 
@@ -26,9 +29,9 @@ impl<T: Real> Effect<T> for TranslationalLift<T> {
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed("gain_s2_per_m2", 6e-4, 3e-3)
             .declared(Declared::TranslationalLift)
-            .only_in(&["saturating", "quadratic", "additive"]),
+            .only_in(&["saturating", "quadratic", "at_rotors"]),
         EffectParameter::signed("gain_s_per_m", 3e-3, 0.02).only_in(&["linear"]),
-        EffectParameter::form(&["saturating", "linear", "quadratic", "additive"]),
+        EffectParameter::form(&["saturating", "linear", "quadratic", "at_rotors"]),
     ];
     const WORDS: Words = Words {
         what: "lift in forward flight",
@@ -52,8 +55,10 @@ numbers! {
         endless,
         /// Over speed, s/m.
         linear,
-        /// Lift over speed squared, N s^2/m^2.
-        added
+        /// Lift of each rotor over speed squared, N s^2/m^2.
+        per_rotor,
+        /// Where the hubs are, m.
+        hub_m [MAX_ROTORS] [3]
     }
 }
 
@@ -67,8 +72,10 @@ impl<T: Real> TranslationalLift<T> {
             out.linear = linear;
         } else if is(form, QUADRATIC) {
             out.endless = extra;
-        } else if is(form, ADDITIVE) {
-            out.added = extra * vehicle.weight_n();
+        } else if is(form, AT_ROTORS) {
+            let rotors = real(vehicle.rotors().len().max(1) as f64);
+            out.per_rotor = extra * vehicle.weight_n() / rotors;
+            out.hub_m = at_rotors::hubs(vehicle);
         } else {
             out.gain = own + extra;
         }
@@ -92,10 +99,12 @@ impl<L: Lane> Acts<L> for Numbers<L> {
     }
     #[inline(always)]
     fn wrench(&self, at: &Situation<'_, L>, forms: Forms) -> BodyWrench<L> {
-        let ([u, v, _], mut force) = (at.flow.velocity, [absent::<L>(); 3]);
-        if forms.has(ADDITIVE) {
-            force[2] = force[2] - self.added * (u * u + v * v);
+        if forms.has(AT_ROTORS) {
+            return at_rotors::wrench(at, &self.hub_m, |_, [u, v, _]| {
+                let lift = L::of(0.0) - self.per_rotor * (u * u + v * v);
+                BodyWrench::from_force([absent(), absent(), lift])
+            });
         }
-        BodyWrench::from_force(force)
+        BodyWrench::from_force([absent(); 3])
     }
 }

@@ -405,6 +405,7 @@ fn another_form_may_come_later() {
         ("battery_sag", 1),
         ("battery_sag", 2),
         ("flapping_moment", 1),
+        ("flapping_moment", 2),
         ("linear_drag", 1),
         ("linear_drag", 2),
         ("axial_inflow", 2),

@@ -3,19 +3,25 @@
 //!
 //! A path leads through the study's JSON: names, places in lists, and `list[key=value,...]` for the
 //! first entry that has these. The format is `%1` for percent with one digit or `.2` for a number
-//! with two. `SQUIRREL_CLAIMS_WRITE=1` writes the figures anew.
+//! with two.
+//!
+//! All the flights take minutes, so `SQUIRREL_CLAIMS_WRITE=1` flies them and writes the figures
+//! anew, with the hashes of some results of each study. The test flies these and compares: a
+//! program that has the same bits in them is the one that the figures are of.
 
+use serde::Serialize;
 use serde_json::Value;
+use squirrel_core::stack::wire::{HASH_START, hash};
 use squirrel_nn::train::EPOCHS;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
-use squirrel_study::forest::{self, Forest};
-use squirrel_study::journal::Keep;
+use squirrel_study::forest;
+use squirrel_study::journal::{Keep, Part};
 use squirrel_study::{paper, steering, table2, table3, thrust};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
-use std::sync::LazyLock;
+use std::path::{Path, PathBuf};
+use std::{fs, process};
 
 const IDS: [&str; 21] = [
     "C1", "C2", "C3", "C4", "N5", "N6", "N7", "N8", "C9", "C10", "C11", "C12", "C13", "C14", "X1",
@@ -29,22 +35,54 @@ fn plan(trials: u32) -> Plan {
     Plan::calm(VehicleFile::squirrel(), Arm::ALONE.to_vec(), trials, SEED)
 }
 
-/// A hundred and five trials of every arm, for both tests.
-static FOREST: LazyLock<Forest> =
-    LazyLock::new(|| forest::run(&plan(105), 2.0, &Keep::default()).unwrap().unwrap());
+/// Of so many trials of a study one is flown again: about twenty flights, and one training.
+const SAMPLED: [(&str, &str); 5] = [
+    ("forest", "1/113"),
+    ("thrust", "1/113"),
+    ("table3", "1/31"),
+    ("steering", "1/313"),
+    ("table2", "1/5"),
+];
 
-fn studies() -> BTreeMap<&'static str, Value> {
-    let keep = Keep::default();
-    let vehicle = VehicleFile::squirrel();
-    let json = |study: &dyn Fn() -> serde_json::Result<Value>| study().unwrap();
-    BTreeMap::from([
-        ("paper", json(&|| serde_json::to_value(paper::facts(&vehicle)))),
-        ("forest", json(&|| serde_json::to_value(&*FOREST))),
-        ("thrust", json(&|| serde_json::to_value(thrust::run(&plan(12), &keep).unwrap()))),
-        ("table3", json(&|| serde_json::to_value(table3::run(&plan(12), &keep).unwrap()))),
-        ("steering", json(&|| serde_json::to_value(steering::run(&plan(6), &keep).unwrap()))),
-        ("table2", json(&|| serde_json::to_value(table2::run(&plan(5), EPOCHS, &keep).unwrap()))),
-    ])
+/// A study with its trials in a folder, or only kept there: then it has no result.
+fn study(name: &str, keep: &Keep<'_>) -> Option<Value> {
+    fn json<T: Serialize>(found: Option<T>) -> Option<Value> {
+        found.map(|found| serde_json::to_value(found).unwrap())
+    }
+    match name {
+        "forest" => json(forest::run(&plan(105), 2.0, keep).unwrap()),
+        "thrust" => json(thrust::run(&plan(12), keep).unwrap()),
+        "table3" => json(table3::run(&plan(12), keep).unwrap()),
+        "steering" => json(steering::run(&plan(6), keep).unwrap()),
+        _ => json(table2::run(&plan(5), EPOCHS, keep).unwrap()),
+    }
+}
+
+/// Hashes of the sampled trials, a line each: study, trial, hash of the result.
+fn flown() -> String {
+    let mut lines = String::new();
+    for (name, part) in SAMPLED {
+        let folder = std::env::temp_dir().join(format!("squirrel-claims-{name}-{}", process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        let part = Part::Shard(part.parse().unwrap());
+        assert_eq!(study(name, &Keep { folder: Some(&folder), part, ..Keep::default() }), None);
+        let journal = fs::read_to_string(folder.join(format!("{name}.trials.jsonl"))).unwrap();
+        let mut trials: Vec<(u64, String)> = journal
+            .lines()
+            .skip(1)
+            .map(|line| {
+                let line: Value = serde_json::from_str(line).unwrap();
+                (line["trial"].as_u64().unwrap(), line["hash"].as_str().unwrap().to_owned())
+            })
+            .collect();
+        trials.sort();
+        for (trial, hash) in trials {
+            lines += &format!("{name} {trial} {hash}\n");
+        }
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    lines
 }
 
 /// What is at a path.
@@ -86,45 +124,71 @@ fn repository() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-#[test]
-fn every_figure_is_the_studies_own() {
-    let file = repository().join("docs/claims.md");
-    let text = std::fs::read_to_string(&file).unwrap();
-    let studies = studies();
-    let mut now = String::new();
-    let mut rest = text.as_str();
-    let mut figures = 0;
+/// A page, each figure put in by its place; and how many.
+fn page(text: &str, figure: impl Fn(&str, &str) -> String) -> (String, usize) {
+    let (mut now, mut rest, mut figures) = (String::new(), text, 0);
     while let Some(at) = rest.find("<!--") {
         let (before, marked) = (&rest[..at], &rest[at + 4..]);
         let (place, after) = marked.split_once("-->").unwrap();
-        let words: Vec<&str> = place.split(' ').collect();
-        let [study, path, format] = words[..] else {
-            panic!("`{place}`: must be a study, a path and a format")
-        };
         let kept = before.trim_end_matches(|c: char| c.is_ascii_digit() || "+-.".contains(c));
         assert!(kept.len() < before.len(), "`{place}`: no figure before it");
-        let value =
-            find(studies.get(study).unwrap_or_else(|| panic!("`{place}`: no such study")), path);
-        now += kept;
-        now += &figure(value, path, format);
-        now += &["<!--", place, "-->"].concat();
+        now += &[kept, &figure(place, &before[kept.len()..]), "<!--", place, "-->"].concat();
         (rest, figures) = (after, figures + 1);
     }
-    now += rest;
-    if std::env::var_os("SQUIRREL_CLAIMS_WRITE").is_some() {
-        std::fs::write(&file, now).unwrap();
+    (now + rest, figures)
+}
+
+/// Every place on the page with its figure, as one hash.
+fn figures_hash(text: &str) -> String {
+    let all = std::cell::RefCell::new(String::new());
+    page(text, |place, figure| {
+        *all.borrow_mut() += &format!("{place} = {figure}\n");
+        figure.to_owned()
+    });
+    format!("figures {:016x}\n", hash(HASH_START, all.borrow().as_bytes()))
+}
+
+#[test]
+fn every_figure_is_the_studies_own() {
+    let file = repository().join("docs/claims.md");
+    let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/claims.txt");
+    let text = fs::read_to_string(&file).unwrap();
+    let writes = std::env::var_os("SQUIRREL_CLAIMS_WRITE").is_some();
+    let facts = serde_json::to_value(paper::facts(&VehicleFile::squirrel())).unwrap();
+    let mut studies = BTreeMap::from([("paper", facts)]);
+    for (name, _) in SAMPLED.iter().filter(|_| writes) {
+        studies.insert(name, study(name, &Keep::default()).unwrap());
+    }
+    let (now, figures) = page(&text, |place, said| {
+        let words: Vec<&str> = place.split(' ').collect();
+        let [of, path, format] = words[..] else {
+            panic!("`{place}`: must be a study, a path and a format")
+        };
+        assert!(of == "paper" || SAMPLED.iter().any(|(name, _)| *name == of), "{place}");
+        studies.get(of).map_or(said.to_owned(), |found| figure(find(found, path), path, format))
+    });
+    assert!(figures > 80, "{figures}");
+    let flown = flown() + &figures_hash(&now);
+    if writes {
+        fs::write(&sample, flown).unwrap();
+        fs::write(&file, now).unwrap();
         return;
     }
     for (line, (said, now)) in text.lines().zip(now.lines()).enumerate() {
         assert_eq!(said, now, "docs/claims.md, line {}", line + 1);
     }
-    assert!(figures > 80, "{figures}");
+    let kept = fs::read_to_string(&sample).unwrap();
+    assert!(kept.lines().count() > 80, "{kept}");
+    for (kept, now) in kept.lines().zip(flown.lines()) {
+        assert_eq!(kept, now, "docs/claims.md is of another program: SQUIRREL_CLAIMS_WRITE=1");
+    }
+    assert_eq!(kept.len(), flown.len());
 }
 
 /// Every claim has its row, and every test that a row names is one.
 #[test]
 fn every_claim_has_a_row_and_a_test() {
-    let text = std::fs::read_to_string(repository().join("docs/claims.md")).unwrap();
+    let text = fs::read_to_string(repository().join("docs/claims.md")).unwrap();
     let rows: BTreeMap<&str, &str> = text
         .lines()
         .filter_map(|line| Some((line.strip_prefix("| ")?.split(" |").next()?, line)))
@@ -132,12 +196,12 @@ fn every_claim_has_a_row_and_a_test() {
     let mut sources = String::new();
     let mut folders = vec![repository().join("crates")];
     while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
+        for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 folders.push(path);
             } else if path.extension().is_some_and(|extension| extension == "rs") {
-                sources += &std::fs::read_to_string(path).unwrap();
+                sources += &fs::read_to_string(path).unwrap();
             }
         }
     }
@@ -153,13 +217,15 @@ fn every_claim_has_a_row_and_a_test() {
     }
 }
 
-/// At T/W 2.
+/// At T/W 2, without the arms that are in no sentence here.
 #[test]
 fn the_better_controller_comes_through_the_forest() {
-    let study = &*FOREST;
-    let row = |arm: &str| study.rows.iter().find(|row| row.arm == arm).unwrap();
-    assert_eq!(study.rows.len(), Arm::ALONE.len());
     let papers = ["pc", "pc_wings_open", "wiic_no_wings", "twcc_flat", "twcc_parnn", "twcc_oracle"];
+    let arms = papers.iter().chain(&["twcc_plus"]).map(|name| Arm::parse(name).unwrap()).collect();
+    let trials = 105;
+    let plan = Plan { arms, ..plan(trials) };
+    let study = &forest::run(&plan, 2.0, &Keep::default()).unwrap().unwrap();
+    let row = |arm: &str| study.rows.iter().find(|row| row.arm == arm).unwrap();
     let best = papers.iter().map(|arm| row(arm).in_band.share.value).fold(0.0, f64::max);
     let ours = row("twcc_plus").in_band.share;
     assert!(ours.value >= 1.5 * best && ours.low > best, "{ours:?}, the paper's best {best}");
@@ -185,7 +251,7 @@ fn the_better_controller_comes_through_the_forest() {
     }
     assert!(forest::words(study)[0].starts_with("twcc_flat"));
     for row in &study.rows {
-        assert!(row.in_band.count <= row.through.count && row.ends.len() == 105);
+        assert!(row.in_band.count <= row.through.count && row.ends.len() == trials as usize);
         assert!(row.path_m <= 400.1 && row.displacement_m <= row.path_m, "{row:?}");
     }
 }

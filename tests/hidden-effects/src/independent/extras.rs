@@ -16,8 +16,8 @@ pub(super) enum Lift {
     Linear(f64),
     /// `k V^2`
     Quadratic(f64),
-    /// A force `k V^2` of the weight, whatever the thrust
-    Additive(f64),
+    /// A force `k V^2` of the weight, whatever the thrust, by the air at each hub
+    AtRotors(f64),
 }
 
 /// A thrust gain over height.
@@ -217,7 +217,7 @@ impl Extras {
                     // The same gain at 6 m/s.
                     "linear" => Lift::Linear(k * 6.0 / (1.0 + 0.004 * 36.0)),
                     "quadratic" => Lift::Quadratic(k),
-                    "additive" => Lift::Additive(k),
+                    "at_rotors" => Lift::AtRotors(k),
                     _ => Lift::Saturating(k),
                 };
             }

@@ -69,7 +69,7 @@ impl World {
 
     fn lift_and_ground(&self, across: f64, down: f64, height_m: f64) -> f64 {
         let lift = match self.extras.lift {
-            Lift::None | Lift::Additive(_) => 0.0,
+            Lift::None | Lift::AtRotors(_) => 0.0,
             Lift::Saturating(k) => k * across * across / (1.0 + 0.004 * across * across),
             Lift::Linear(k) => k * across,
             Lift::Quadratic(k) => k * across * across,
@@ -172,7 +172,10 @@ impl World {
             let t = rotor.thrust_coefficient_n_s2 * x.thrust[i] * square * factor;
             thrust += t;
             let hub = v + omega.cross(&rotor.position_body_m);
-            let pull = -hub_drag.component_mul(&hub) * (state.rotors[i] / hover_rad_s);
+            let mut pull = -hub_drag.component_mul(&hub) * (state.rotors[i] / hover_rad_s);
+            if let Lift::AtRotors(k) = x.lift {
+                pull.z -= k * hub.xy().norm_squared() * weight_n / a.rotors.len() as f64;
+            }
             force += pull;
             moment += rotor.position_body_m.cross(&pull);
             rotors.push(Jet { position: rotor.position_body_m, thrust_n: t });
@@ -184,9 +187,6 @@ impl World {
             spin_rate -= rotor.yaw_sign * rotor_rates[i];
         }
         force.z -= thrust;
-        if let Lift::Additive(k) = x.lift {
-            force.z -= k * (v.x * v.x + v.y * v.y) * weight_n;
-        }
         let half_density = 0.5 * AIR_DENSITY_KG_M3 * speed;
         force -= (a.drag_n_s_per_m + x.linear_drag).component_mul(&v);
         force -= half_density * (x.drag_area.add_scalar(a.drag_area_m2)).component_mul(&v);

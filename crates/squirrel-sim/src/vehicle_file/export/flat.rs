@@ -254,7 +254,7 @@ fn lift(own: f64, effects: &Effects<f64>) -> f64 {
     let saturated = 1.0 / (1.0 + LIFT_SATURATION * SPEED_M_S * SPEED_M_S);
     let extra = match form(effects, "translational_lift") {
         "linear" => line / SPEED_M_S,
-        "quadratic" | "additive" => square,
+        "quadratic" | "at_rotors" => square,
         _ => square * saturated,
     };
     own * saturated + extra

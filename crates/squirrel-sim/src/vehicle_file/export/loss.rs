@@ -171,7 +171,7 @@ fn of_effect(file: &VehicleFile, keeps: &Keeps, name: &str) -> Option<String> {
         },
         "axial_inflow" if keeps.axial && form != "quadratic" => None,
         "axial_inflow" if keeps.axial => Some("only what is linear in speed".to_owned()),
-        "translational_lift" if keeps.lift && matches!(form, "quadratic" | "additive") => None,
+        "translational_lift" if keeps.lift && matches!(form, "quadratic" | "at_rotors") => None,
         "translational_lift" if keeps.lift => at_5(),
         "flapping_moment" if keeps.flapping && form != "saturating" => None,
         "flapping_moment" if keeps.flapping => at_5(),
