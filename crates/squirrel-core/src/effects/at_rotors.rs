@@ -7,63 +7,91 @@
 //! and Salaun, ICRA 2010; Bangura and Mahony, 2017). So they damp turning, too. With all rotors at
 //! the speed of hover and nothing turning they add up to the standard forms.
 
+//! All effects together are one sum over the rotors, [`Numbers`].
+
 use super::Situation;
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::lane::vector::{cross, plus};
-use crate::math::{Real, sqrt};
+use crate::math::{Real, real, sqrt};
+use crate::numbers;
 use crate::vehicle::{MAX_ROTORS, Vehicle};
 
-/// Where the hubs are, from the centre of mass, m; zero for what is no rotor.
-pub(super) fn hubs<T: Real>(vehicle: &Vehicle<T>) -> [[T; 3]; MAX_ROTORS] {
-    let mut out = [[T::zero(); 3]; MAX_ROTORS];
-    for (hub, rotor) in out.iter_mut().zip(vehicle.rotors()) {
-        *hub = rotor.position.vector.into();
-    }
-    out
+/// What effects have of it, all rotors together: at the speed of hover, and for lift at any.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slopes<T> {
+    /// Force over velocity along each axis, N s/m.
+    pub drag: [T; 3],
+    /// Moment over velocity, N m s/m.
+    pub flapping: T,
+    /// Lift over velocity squared, N s^2/m^2.
+    pub lift: T,
 }
 
-/// 1 over the sum of the rotor speeds in hover, s/rad.
-pub(super) fn per_hover<T: Real>(vehicle: &Vehicle<T>) -> T {
-    let per_square = &vehicle.rotor_wrench_per_speed_squared().thrust;
-    let (mut count, mut thrust) = (T::zero(), T::zero());
-    for (_, one) in vehicle.rotors().iter().zip(per_square) {
-        count += T::one();
-        thrust += *one;
+impl<T: Real> Slopes<T> {
+    /// Nothing.
+    pub fn none() -> Self {
+        Self { drag: [T::zero(); 3], flapping: T::zero(), lift: T::zero() }
     }
-    sqrt(thrust / vehicle.weight_n()) / count
+    /// Both.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            drag: core::array::from_fn(|k| self.drag[k] + other.drag[k]),
+            flapping: self.flapping + other.flapping,
+            lift: self.lift + other.lift,
+        }
+    }
 }
 
-/// The wrench of all of them.
-///
-/// * `one` - force and moment of a rotor at its hub, of its speed, rad/s, and of the hub's velocity
-///   through the air, m/s
-#[inline(always)]
-pub(super) fn wrench<L: Lane>(
-    at: &Situation<'_, L>,
-    hubs: &[[L; 3]; MAX_ROTORS],
-    one: impl Fn(L, [L; 3]) -> BodyWrench<L>,
-) -> BodyWrench<L> {
-    let mut out = BodyWrench::zero();
-    for (hub, &speed) in hubs.iter().zip(at.rotor_speed) {
-        let velocity = plus(&at.flow.velocity, &cross(&at.flow.omega, hub));
-        let BodyWrench { force, moment } = one(speed, velocity);
-        out = out.plus(&BodyWrench { force, moment: plus(&moment, &cross(hub, &force)) });
+numbers! {
+    /// The same of each rotor.
+    Numbers {
+        /// Over speed and velocity, along each axis, N s^2/(m rad).
+        drag [3],
+        /// Likewise, N m s^2/(m rad).
+        flapping,
+        /// Over velocity squared, N s^2/m^2.
+        lift,
+        /// Hubs, from the centre of mass, m; zero for what is no rotor.
+        hub_m [MAX_ROTORS] [3]
     }
-    out
 }
 
-/// The wrench of forces `-S w_i v_i`.
-///
-/// * `slope` - `S` along each axis, N s^2/(m rad)
-#[inline(always)]
-pub(super) fn drag<L: Lane>(
-    at: &Situation<'_, L>,
-    hubs: &[[L; 3]; MAX_ROTORS],
-    slope: &[L; 3],
-) -> BodyWrench<L> {
-    wrench(at, hubs, |speed, velocity| {
-        let pull = core::array::from_fn(|k| L::of(0.0) - slope[k] * speed * velocity[k]);
-        BodyWrench::from_force(pull)
-    })
+impl<T: Real> Numbers<T> {
+    pub(super) fn new(slopes: &Slopes<T>, vehicle: &Vehicle<T>) -> Self {
+        let rotors = vehicle.rotors();
+        let count = real::<T>(rotors.len().max(1) as f64);
+        let per_square = &vehicle.rotor_wrench_per_speed_squared().thrust;
+        let thrust = per_square.iter().fold(T::zero(), |sum, one| sum + *one);
+        // 1 over the sum of the rotors' speeds in hover.
+        let per_hover = sqrt(thrust / vehicle.weight_n()) / count;
+        let mut hub_m = [[T::zero(); 3]; MAX_ROTORS];
+        for (hub, rotor) in hub_m.iter_mut().zip(rotors) {
+            *hub = rotor.position.vector.into();
+        }
+        Self {
+            drag: slopes.drag.map(|slope| slope * per_hover),
+            flapping: slopes.flapping * per_hover,
+            lift: slopes.lift / count,
+            hub_m,
+        }
+    }
+}
+
+impl<L: Lane> Numbers<L> {
+    #[inline(always)]
+    pub(super) fn wrench(&self, at: &Situation<'_, L>) -> BodyWrench<L> {
+        let (mut out, none) = (BodyWrench::zero(), L::of(0.0));
+        for (hub, &speed) in self.hub_m.iter().zip(at.rotor_speed) {
+            let [u, v, w] = plus(&at.flow.velocity, &cross(&at.flow.omega, hub));
+            let ([x, y, z], flapping) = (self.drag, self.flapping * speed);
+            let lift = self.lift * (u * u + v * v);
+            let force = [none - x * speed * u, none - y * speed * v, none - z * speed * w - lift];
+            let [roll, pitch, yaw] = cross(hub, &force);
+            let moment = [roll - v * flapping, pitch + u * flapping, yaw];
+            out = out.plus(&BodyWrench { force, moment });
+        }
+        out
+    }
 }

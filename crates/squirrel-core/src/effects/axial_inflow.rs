@@ -3,17 +3,15 @@
 //!
 //! Form `quadratic`: `T (1 + k w + k_2 w |w|)`. Form `at_rotors`: the air at each hub takes of that
 //! rotor's thrust, in proportion to its speed, `k` of the weight with all at hover; see
-//! [`at_rotors`].
+//! [`at_rotors`](super::at_rotors).
 
-use super::{
-    Acts, Declared, Effect, EffectParameter, Forms, Shown, Situation, Words, absent, at_rotors, is,
-};
-use crate::aero::{Airflow, BodyWrench};
+use super::{Acts, Declared, Effect, EffectParameter, Forms, Shown, Slopes, Words, is};
+use crate::aero::Airflow;
 use crate::lane::Lane;
 use crate::lane::functions::size;
 use crate::math::Real;
 use crate::numbers;
-use crate::vehicle::{MAX_ROTORS, Vehicle};
+use crate::vehicle::Vehicle;
 
 const QUADRATIC: usize = 1;
 const AT_ROTORS: usize = 2;
@@ -36,6 +34,12 @@ impl<T: Real> Effect<T> for AxialInflow<T> {
         fly: "climbs and descents of 3 m/s with heave doublets, wings folded",
     };
     const SHOWN: Shown = Shown::HORIZONTAL;
+    const AT_ROTORS: Option<usize> = Some(AT_ROTORS);
+
+    fn at_rotors(&self, vehicle: &Vehicle<T>) -> Slopes<T> {
+        let none = T::zero();
+        Slopes { drag: [none, none, self.0[0] * vehicle.weight_n()], ..Slopes::none() }
+    }
 
     fn is_declared(vehicle: &Vehicle<T>) -> bool {
         vehicle.parameters().propulsion.air.axial_inflow_s_per_m != T::zero()
@@ -48,30 +52,16 @@ numbers! {
         /// Over speed, s/m.
         gain,
         /// Over its square, s^2/m^2.
-        quadratic,
-        /// Of each rotor over its speed, along each axis, N s^2/(m rad).
-        per_rotor [3],
-        /// Where the hubs are, m.
-        hub_m [MAX_ROTORS] [3]
+        quadratic
     }
 }
 
 impl<T: Real> AxialInflow<T> {
     pub(super) fn prepare(&self, vehicle: &Vehicle<T>) -> Numbers<T> {
-        let ([extra, quadratic, form], none) = (self.0, T::zero());
+        let [extra, quadratic, form] = self.0;
         let own = vehicle.parameters().propulsion.air.axial_inflow_s_per_m;
-        let mut out = Numbers::all(none);
-        if is(form, AT_ROTORS) {
-            let each = extra * vehicle.weight_n() * at_rotors::per_hover(vehicle);
-            (out.per_rotor, out.hub_m) = ([none, none, each], at_rotors::hubs(vehicle));
-            out.gain = own;
-            return out;
-        }
-        out.gain = own + extra;
-        if is(form, QUADRATIC) {
-            out.quadratic = quadratic;
-        }
-        out
+        let gain = if is(form, AT_ROTORS) { own } else { own + extra };
+        Numbers { gain, quadratic: if is(form, QUADRATIC) { quadratic } else { T::zero() } }
     }
 }
 
@@ -80,12 +70,5 @@ impl<L: Lane> Acts<L> for Numbers<L> {
     fn thrust_factor(&self, flow: &Airflow<L>, _height_m: L, _: Forms) -> L {
         let w = flow.velocity[2];
         L::of(1.0) + self.gain * w + self.quadratic * w * size(w)
-    }
-    #[inline(always)]
-    fn wrench(&self, at: &Situation<'_, L>, forms: Forms) -> BodyWrench<L> {
-        if forms.has(AT_ROTORS) {
-            return at_rotors::drag(at, &self.hub_m, &self.per_rotor);
-        }
-        BodyWrench::from_force([absent(); 3])
     }
 }

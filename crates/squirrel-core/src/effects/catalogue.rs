@@ -5,7 +5,7 @@
 
 use super::{
     Acts, Alteration, CommandClock, Effect, EffectParameter, FORM, Forms, GustSpectrum, Pendulum,
-    Profile, Situation, is,
+    Profile, Situation, Slopes, at_rotors, is,
 };
 use crate::aero::{Airflow, BodyWrench};
 use crate::frames::{Body, In};
@@ -245,6 +245,11 @@ macro_rules! catalogue {
             pub fn has_added_mass(self) -> bool {
                 self.added_mass.any()
             }
+            /// Whether any acts at the rotors' hubs.
+            #[inline(always)]
+            pub fn act_at_rotors(self) -> bool {
+                $(<super::$field::$effect<f64> as Effect<f64>>::AT_ROTORS.is_some_and(|form| self.$field.has(form)) ||)+ false
+            }
             /// Whether a load swings under the vehicle.
             #[inline(always)]
             pub fn has_load(self) -> bool {
@@ -257,19 +262,25 @@ macro_rules! catalogue {
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct Prepared<X: Copy> {
             $($($module: super::$module::Numbers<X>,)?)+
+            /// Of all effects together.
+            hubs: at_rotors::Numbers<X>,
         }
 
         impl<T: Real> Prepared<T> {
             /// Of a vehicle's effects.
             pub fn new(effects: &Effects<T>, vehicle: &Vehicle<T>) -> Self {
-                Self { $($($module: effects.$field.unwrap_or_else(|| super::$field::$effect(core::array::from_fn(|_| T::zero()))).prepare(vehicle),)?)+ }
+                let (present, mut slopes) = (Present::of(effects), Slopes::none());
+                $(if let Some(effect) = &effects.$field && <super::$field::$effect<T> as Effect<T>>::AT_ROTORS.is_some_and(|form| present.$field.has(form)) {
+                    slopes = slopes.plus(effect.at_rotors(vehicle));
+                })+
+                Self { $($($module: effects.$field.unwrap_or_else(|| super::$field::$effect(core::array::from_fn(|_| T::zero()))).prepare(vehicle),)?)+ hubs: at_rotors::Numbers::new(&slopes, vehicle) }
             }
         }
 
         impl<X: Copy> Prepared<X> {
             /// The same numbers in another form.
             pub fn map<Y: Copy>(&self, f: impl Fn(X) -> Y) -> Prepared<Y> {
-                Prepared { $($($module: self.$module.map(&f),)?)+ }
+                Prepared { $($($module: self.$module.map(&f),)?)+ hubs: self.hubs.map(&f) }
             }
         }
 
@@ -277,10 +288,11 @@ macro_rules! catalogue {
             /// Puts the numbers of a vehicle into column `lane`.
             pub fn put(&mut self, lane: usize, numbers: &Prepared<S>) {
                 $($(self.$module.put(lane, &numbers.$module);)?)+
+                self.hubs.put(lane, &numbers.hubs);
             }
             /// The numbers in column `lane`.
             pub fn take(&self, lane: usize) -> Prepared<S> {
-                Prepared { $($($module: self.$module.take(lane),)?)+ }
+                Prepared { $($($module: self.$module.take(lane),)?)+ hubs: self.hubs.take(lane) }
             }
         }
 
@@ -288,7 +300,7 @@ macro_rules! catalogue {
             /// Registers from column `start` and on.
             #[inline(always)]
             pub fn load(rows: &Prepared<Row<L::Element>>, start: usize) -> Self {
-                Self { $($($module: super::$module::Numbers::load(&rows.$module, start),)?)+ }
+                Self { $($($module: super::$module::Numbers::load(&rows.$module, start),)?)+ hubs: at_rotors::Numbers::load(&rows.hubs, start) }
             }
         }
 
@@ -343,6 +355,9 @@ macro_rules! catalogue {
             pub fn wrench(&self, present: Present, at: &Situation<'_, L>) -> BodyWrench<L> {
                 let mut sum = BodyWrench::zero();
                 $($(if present.$module.any() { sum = sum.plus(&self.$module.wrench(at, present.$module)); })?)+
+                if present.act_at_rotors() {
+                    sum = sum.plus(&self.hubs.wrench(at));
+                }
                 sum
             }
         }

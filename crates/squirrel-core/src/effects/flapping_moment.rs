@@ -2,17 +2,17 @@
 //!
 //! Form `saturating`: the velocity is divided by `1 + V_h / scale`, `V_h` the airspeed in the rotor
 //! plane. Form `at_rotors`: each rotor's part grows with its speed and with the velocity of its hub
-//! through the air, `k` with all at hover; see [`at_rotors`].
+//! through the air, `k` with all at hover; see [`at_rotors`](super::at_rotors).
 
 use super::{
-    Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent,
-    at_rotors, is,
+    Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Slopes, Words, absent,
+    is,
 };
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
 use crate::numbers;
-use crate::vehicle::{MAX_ROTORS, Vehicle};
+use crate::vehicle::Vehicle;
 
 const SATURATING: usize = 1;
 const AT_ROTORS: usize = 2;
@@ -38,6 +38,11 @@ impl<T: Real> Effect<T> for FlappingMoment<T> {
     };
     const SHOWN: Shown = Shown::MOMENTS.and(Shown::LASTING);
     const IS_OF_MOMENTS: bool = true;
+    const AT_ROTORS: Option<usize> = Some(AT_ROTORS);
+
+    fn at_rotors(&self, _vehicle: &Vehicle<T>) -> Slopes<T> {
+        Slopes { flapping: self.0[0], ..Slopes::none() }
+    }
 
     fn is_declared(vehicle: &Vehicle<T>) -> bool {
         vehicle.parameters().propulsion.air.flapping_moment_n_m_s_per_m != T::zero()
@@ -52,31 +57,27 @@ numbers! {
         /// What saturates of it, likewise.
         saturating,
         /// Over the speed at which it saturates, s/m; 0 for a gain that stays.
-        per_scale,
-        /// Of each rotor over its speed, N m s^2/(m rad).
-        per_rotor,
-        /// Where the hubs are, m.
-        hub_m [MAX_ROTORS] [3]
+        per_scale
     }
 }
 
 impl<T: Real> FlappingMoment<T> {
     pub(super) fn prepare(&self, vehicle: &Vehicle<T>) -> Numbers<T> {
         let [extra, scale, form] = self.0;
-        let mut out = Numbers::all(T::zero());
-        out.gain = vehicle.parameters().propulsion.air.flapping_moment_n_m_s_per_m;
-        if is(form, SATURATING) {
-            // A scale of 0 saturates at once.
-            if scale > T::zero() {
-                (out.saturating, out.per_scale) = (extra, T::one() / scale);
-            }
-        } else if is(form, AT_ROTORS) {
-            out.per_rotor = extra * at_rotors::per_hover(vehicle);
-            out.hub_m = at_rotors::hubs(vehicle);
-        } else {
-            out.gain += extra;
+        let (gain, none) =
+            (vehicle.parameters().propulsion.air.flapping_moment_n_m_s_per_m, T::zero());
+        if is(form, AT_ROTORS) {
+            return Numbers { gain, saturating: none, per_scale: none };
         }
-        out
+        if !is(form, SATURATING) {
+            return Numbers { gain: gain + extra, saturating: none, per_scale: none };
+        }
+        // A scale of 0 saturates at once.
+        if scale > none {
+            Numbers { gain, saturating: extra, per_scale: T::one() / scale }
+        } else {
+            Numbers { gain, saturating: none, per_scale: none }
+        }
     }
 }
 
@@ -89,13 +90,6 @@ impl<L: Lane> Acts<L> for Numbers<L> {
             slope =
                 slope + self.saturating / (L::of(1.0) + (u * u + v * v).root() * self.per_scale);
         }
-        let out = BodyWrench::from_moment([absent::<L>() - v * slope, u * slope, absent()]);
-        if forms.has(AT_ROTORS) {
-            return out.plus(&at_rotors::wrench(at, &self.hub_m, |speed, [u, v, _]| {
-                let slope = self.per_rotor * speed;
-                BodyWrench::from_moment([absent::<L>() - v * slope, u * slope, absent()])
-            }));
-        }
-        out
+        BodyWrench::from_moment([absent::<L>() - v * slope, u * slope, absent()])
     }
 }

@@ -4,17 +4,17 @@
 //! than wide (Svacha et al. 2017 identify such a drag matrix).
 //!
 //! Form `at_rotors`: each rotor's part acts at its hub and grows with its speed, `(D, D, D_z)` with
-//! all at hover; see [`at_rotors`].
+//! all at hover; see [`at_rotors`](super::at_rotors).
 
 use super::{
-    Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent,
-    at_rotors, is,
+    Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Slopes, Words, absent,
+    is,
 };
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
 use crate::numbers;
-use crate::vehicle::{MAX_ROTORS, Vehicle};
+use crate::vehicle::Vehicle;
 
 const ANISOTROPIC: usize = 1;
 const AT_ROTORS: usize = 2;
@@ -43,50 +43,45 @@ impl<T: Real> Effect<T> for LinearDrag<T> {
         fly: "dashes at several speeds from 2 to 9 m/s, both ways",
     };
     const SHOWN: Shown = Shown::LASTING.and(Shown::HORIZONTAL);
+    const AT_ROTORS: Option<usize> = Some(AT_ROTORS);
+
+    fn at_rotors(&self, _vehicle: &Vehicle<T>) -> Slopes<T> {
+        let [drag, _, drag_z, _] = self.0;
+        Slopes { drag: [drag, drag, drag_z], ..Slopes::none() }
+    }
 }
 
 numbers! {
     /// Drag over speed, N s/m.
     Numbers {
         /// Along each axis.
-        slope [3],
-        /// Of each rotor over its speed, along each axis, N s^2/(m rad).
-        per_rotor [3],
-        /// Where the hubs are, m.
-        hub_m [MAX_ROTORS] [3]
+        slope [3]
     }
 }
 
 impl<T: Real> LinearDrag<T> {
-    pub(super) fn prepare(&self, vehicle: &Vehicle<T>) -> Numbers<T> {
-        let ([drag, anisotropy, drag_z, form], none) = (self.0, T::zero());
-        let out = Numbers::all(none);
-        if is(form, AT_ROTORS) {
-            let each = at_rotors::per_hover(vehicle);
-            let per_rotor = [drag * each, drag * each, drag_z * each];
-            return Numbers { per_rotor, hub_m: at_rotors::hubs(vehicle), ..out };
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
+        let [drag, anisotropy, drag_z, form] = self.0;
+        Numbers {
+            slope: if is(form, ANISOTROPIC) {
+                [drag * (T::one() + anisotropy), drag * (T::one() - anisotropy), drag_z]
+            } else if is(form, AT_ROTORS) {
+                [T::zero(); 3]
+            } else {
+                [drag, drag, T::zero()]
+            },
         }
-        let slope = if is(form, ANISOTROPIC) {
-            [drag * (T::one() + anisotropy), drag * (T::one() - anisotropy), drag_z]
-        } else {
-            [drag, drag, none]
-        };
-        Numbers { slope, ..out }
     }
 }
 
 impl<L: Lane> Acts<L> for Numbers<L> {
     #[inline(always)]
-    fn wrench(&self, at: &Situation<'_, L>, forms: Forms) -> BodyWrench<L> {
+    fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
         let ([x, y, z], [u, v, w]) = (self.slope, at.flow.velocity);
-        let out = BodyWrench::from_force([
+        BodyWrench::from_force([
             absent::<L>() - x * u,
             absent::<L>() - y * v,
             absent::<L>() - z * w,
-        ]);
-        if forms.has(AT_ROTORS) {
-            return out.plus(&at_rotors::drag(at, &self.hub_m, &self.per_rotor));
-        }
-        out
+        ])
     }
 }

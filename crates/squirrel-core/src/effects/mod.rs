@@ -58,6 +58,7 @@ mod wing_tangential;
 mod yaw_torque_coeff;
 
 pub use actuation_latency::ActuationLatency;
+pub use at_rotors::Slopes;
 pub use battery_sag::BatterySag;
 pub use catalogue::{Acting, Effects, Found, Prepared, Present};
 pub use cg_offset::CgOffset;
@@ -337,6 +338,8 @@ pub trait Effect<T: Real>: Copy {
     /// Whether each form beyond the standard one is an equation of its own, that a batch has a
     /// place for or not.
     const FORMS_APART: bool = false;
+    /// The number of its form that acts at the rotors' hubs.
+    const AT_ROTORS: Option<usize> = None;
 
     /// Whether a vehicle has some of it as a number of its own, to which the effect adds.
     #[inline(always)]
@@ -405,6 +408,10 @@ pub trait Effect<T: Real>: Copy {
     #[inline(always)]
     fn pendulum(&self) -> Option<Pendulum<T>> {
         None
+    }
+    /// What its form at the rotors' hubs does there.
+    fn at_rotors(&self, _vehicle: &Vehicle<T>) -> Slopes<T> {
+        Slopes::none()
     }
     /// Changes numbers of the airframe.
     #[inline(always)]

@@ -3,16 +3,14 @@
 //!
 //! Form `linear`: `T (1 + k V_h)`. Form `quadratic`: `T (1 + k V_h^2)`, without saturation. Form
 //! `at_rotors`: `T + k V_h^2 m g` whatever the thrust, of each rotor its part by the air at its hub;
-//! see [`at_rotors`].
+//! see [`at_rotors`](super::at_rotors).
 
-use super::{
-    Acts, Declared, Effect, EffectParameter, Forms, Shown, Situation, Words, absent, at_rotors, is,
-};
-use crate::aero::{Airflow, BodyWrench};
+use super::{Acts, Declared, Effect, EffectParameter, Forms, Shown, Slopes, Words, is};
+use crate::aero::Airflow;
 use crate::lane::Lane;
-use crate::math::{Real, real};
+use crate::math::Real;
 use crate::numbers;
-use crate::vehicle::{MAX_ROTORS, Vehicle};
+use crate::vehicle::Vehicle;
 
 const LINEAR: usize = 1;
 const QUADRATIC: usize = 2;
@@ -40,6 +38,11 @@ impl<T: Real> Effect<T> for TranslationalLift<T> {
         fly: "dashes to 9 m/s at constant height with the wings folded",
     };
     const SHOWN: Shown = Shown::HORIZONTAL;
+    const AT_ROTORS: Option<usize> = Some(AT_ROTORS);
+
+    fn at_rotors(&self, vehicle: &Vehicle<T>) -> Slopes<T> {
+        Slopes { lift: self.0[0] * vehicle.weight_n(), ..Slopes::none() }
+    }
 
     fn is_declared(vehicle: &Vehicle<T>) -> bool {
         vehicle.parameters().propulsion.air.translational_lift_s2_per_m2 != T::zero()
@@ -54,32 +57,24 @@ numbers! {
         /// The same without an end.
         endless,
         /// Over speed, s/m.
-        linear,
-        /// Lift of each rotor over speed squared, N s^2/m^2.
-        per_rotor,
-        /// Where the hubs are, m.
-        hub_m [MAX_ROTORS] [3]
+        linear
     }
 }
 
 impl<T: Real> TranslationalLift<T> {
     pub(super) fn prepare(&self, vehicle: &Vehicle<T>) -> Numbers<T> {
         let [extra, linear, form] = self.0;
-        let own = vehicle.parameters().propulsion.air.translational_lift_s2_per_m2;
-        let mut out = Numbers::all(T::zero());
-        out.gain = own;
+        let (gain, none) =
+            (vehicle.parameters().propulsion.air.translational_lift_s2_per_m2, T::zero());
         if is(form, LINEAR) {
-            out.linear = linear;
+            Numbers { gain, endless: none, linear }
         } else if is(form, QUADRATIC) {
-            out.endless = extra;
+            Numbers { gain, endless: extra, linear: none }
         } else if is(form, AT_ROTORS) {
-            let rotors = real(vehicle.rotors().len().max(1) as f64);
-            out.per_rotor = extra * vehicle.weight_n() / rotors;
-            out.hub_m = at_rotors::hubs(vehicle);
+            Numbers { gain, endless: none, linear: none }
         } else {
-            out.gain = own + extra;
+            Numbers { gain: gain + extra, endless: none, linear: none }
         }
-        out
     }
 }
 
@@ -96,15 +91,5 @@ impl<L: Lane> Acts<L> for Numbers<L> {
             factor = factor + self.linear * across.root();
         }
         factor
-    }
-    #[inline(always)]
-    fn wrench(&self, at: &Situation<'_, L>, forms: Forms) -> BodyWrench<L> {
-        if forms.has(AT_ROTORS) {
-            return at_rotors::wrench(at, &self.hub_m, |_, [u, v, _]| {
-                let lift = L::of(0.0) - self.per_rotor * (u * u + v * v);
-                BodyWrench::from_force([absent(), absent(), lift])
-            });
-        }
-        BodyWrench::from_force([absent(); 3])
     }
 }
