@@ -60,7 +60,7 @@ fn study(name: &str, keep: &Keep<'_>) -> Option<Value> {
 
 /// Hashes of the sampled trials, a line each: study, trial, hash of the result.
 fn flown() -> String {
-    let mut lines = String::new();
+    let mut lines = Vec::new();
     for (name, part) in SAMPLED {
         let folder = std::env::temp_dir().join(format!("squirrel-claims-{name}-{}", process::id()));
         let _ = fs::remove_dir_all(&folder);
@@ -78,11 +78,11 @@ fn flown() -> String {
             .collect();
         trials.sort();
         for (trial, hash) in trials {
-            lines += &format!("{name} {trial} {hash}\n");
+            lines.push(format!("{name} {trial} {hash}\n"));
         }
         fs::remove_dir_all(&folder).unwrap();
     }
-    lines
+    lines.concat()
 }
 
 /// What is at a path.
@@ -125,7 +125,7 @@ fn repository() -> PathBuf {
 }
 
 /// A page, each figure put in by its place; and how many.
-fn page(text: &str, figure: impl Fn(&str, &str) -> String) -> (String, usize) {
+fn page(text: &str, mut figure: impl FnMut(&str, &str) -> String) -> (String, usize) {
     let (mut now, mut rest, mut figures) = (String::new(), text, 0);
     while let Some(at) = rest.find("<!--") {
         let (before, marked) = (&rest[..at], &rest[at + 4..]);
@@ -140,12 +140,12 @@ fn page(text: &str, figure: impl Fn(&str, &str) -> String) -> (String, usize) {
 
 /// Every place on the page with its figure, as one hash.
 fn figures_hash(text: &str) -> String {
-    let all = std::cell::RefCell::new(String::new());
+    let mut all = Vec::new();
     page(text, |place, figure| {
-        *all.borrow_mut() += &format!("{place} = {figure}\n");
+        all.push(format!("{place} = {figure}\n"));
         figure.to_owned()
     });
-    format!("figures {:016x}\n", hash(HASH_START, all.borrow().as_bytes()))
+    format!("figures {:016x}\n", hash(HASH_START, all.concat().as_bytes()))
 }
 
 #[test]

@@ -85,6 +85,26 @@ impl World {
         (1.0 + lift) * (1.0 + self.extras.inflow * down) * ground
     }
 
+    /// Force and moment of what the air does at the hub of each rotor.
+    fn at_hubs(&self, v: Vector3<f64>, omega: Vector3<f64>, state: &State) -> [Vector3<f64>; 2] {
+        let (a, x) = (&self.airframe, &self.extras);
+        let (weight_n, rotors) = (a.mass_kg * GRAVITY_M_S2, a.rotors.len() as f64);
+        let drag = x.hub_drag + Vector3::z() * (x.hub_inflow * weight_n);
+        let hover_rad_s = a.hover_command() * a.speed_max_rad_s;
+        let mut sum = [Vector3::zeros(); 2];
+        for (i, rotor) in a.rotors.iter().enumerate() {
+            let hub = v + omega.cross(&rotor.position_body_m);
+            let mut pull = -drag.component_mul(&hub) * (state.rotors[i] / hover_rad_s);
+            if let Lift::AtRotors(k) = x.lift {
+                pull.z -= k * hub.xy().norm_squared() * weight_n;
+            }
+            pull /= rotors;
+            sum[0] += pull;
+            sum[1] += rotor.position_body_m.cross(&pull);
+        }
+        sum
+    }
+
     /// Force and moment of the wings.
     fn wings(&self, v: Vector3<f64>, roll_rate: f64, deployment: Vector2<f64>) -> (f64, f64) {
         let (a, x) = (&self.airframe, &self.extras);
@@ -159,25 +179,15 @@ impl World {
 
         let factor = self.lift_and_ground(v.x.hypot(v.y), v.z, height_m) * unknown.thrust_factor;
         let ratio = self.speed_ratio(input);
-        let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
+        let [mut force, mut moment] = self.at_hubs(v, omega, state);
         let (mut thrust, mut spin, mut spin_rate) = (0.0, 0.0, 0.0);
         let mut rotor_rates = state.rotors * 0.0;
         let mut rotors = Rotors::default();
-        let weight_n = a.mass_kg * GRAVITY_M_S2;
-        let hub_drag = x.hub_drag + Vector3::z() * (x.hub_inflow * weight_n);
-        let hover_rad_s = a.hover_command() * a.speed_max_rad_s * a.rotors.len() as f64;
         for (i, rotor) in a.rotors.iter().enumerate() {
             let weak = if unknown.weak_rotor == Some(i) { 1.0 - unknown.weak_loss } else { 1.0 };
             let square = state.rotors[i] * state.rotors[i] * weak;
             let t = rotor.thrust_coefficient_n_s2 * x.thrust[i] * square * factor;
             thrust += t;
-            let hub = v + omega.cross(&rotor.position_body_m);
-            let mut pull = -hub_drag.component_mul(&hub) * (state.rotors[i] / hover_rad_s);
-            if let Lift::AtRotors(k) = x.lift {
-                pull.z -= k * hub.xy().norm_squared() * weight_n / a.rotors.len() as f64;
-            }
-            force += pull;
-            moment += rotor.position_body_m.cross(&pull);
             rotors.push(Jet { position: rotor.position_body_m, thrust_n: t });
             moment += rotor.position_body_m.cross(&Vector3::new(0.0, 0.0, -t));
             moment.z += rotor.yaw_sign * rotor.torque_coefficient_n_m_s2 * x.torque[i] * square;
@@ -208,7 +218,7 @@ impl World {
                 -thrust * Vector3::new(x.tilt.x, x.tilt.y, 1.0),
                 rotors.all().iter().map(pushed).sum(),
             ],
-            weight_n,
+            weight_n: a.mass_kg * GRAVITY_M_S2,
             propeller_radius_m: planform.propeller_radius_m,
             wings: Wings {
                 area_m2: a.wing_area_m2,

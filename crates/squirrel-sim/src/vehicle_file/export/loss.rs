@@ -158,9 +158,8 @@ fn of_effect(file: &VehicleFile, keeps: &Keeps, name: &str) -> Option<String> {
             (_, "at_rotors") if keeps.pulls != Pulls::LinearAtHubs => {
                 Some("acts at the centre of mass: damps no turning".to_owned())
             }
-            (_, "at_rotors") => None,
             (Axes::Alike, "isotropic" | "") => Some("acts along z, too".to_owned()),
-            (Axes::Each, _) | (_, "isotropic" | "") => None,
+            (Axes::Each, _) | (_, "isotropic" | "at_rotors" | "") => None,
             _ => Some("one number for x and y: the mean".to_owned()),
         },
         "quadratic_drag" => match (keeps.quadratic, form) {
