@@ -5,8 +5,8 @@
 //! flapping moment that go with the rotor's speed and the velocity of its hub through the air,
 //! `F_i = -S w_i (v + omega x r_i)`, and a lift that goes with the square of that velocity (Martin
 //! and Salaun, ICRA 2010; Bangura and Mahony, 2017). So they damp turning, too. With all rotors at
-//! the speed of hover and nothing turning they add up to the standard forms.
-
+//! the speed of hover and nothing turning they add up to the forms at the centre of mass.
+//!
 //! All effects together are one sum over the rotors, [`Numbers`].
 
 use super::Situation;

@@ -4,7 +4,7 @@
 use crate::plant::{Plant, WingPlant};
 use crate::vehicle_file::VehicleFile;
 use squirrel_core::aero::induced;
-use squirrel_core::effects::{Effects, FORM, Kind};
+use squirrel_core::effects::{Effects, FORM, Kind, Present};
 use squirrel_core::frames::In;
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::{Matrix3, Vector3};
@@ -60,6 +60,8 @@ pub(super) struct Flat {
     pub(super) lift: f64,
     /// Moment over speed across the rotors, N m s/m, as at 5 m/s.
     pub(super) flapping: f64,
+    /// Whether an effect acts at the rotors' hubs.
+    pub(super) acts_at_rotors: bool,
     /// Steady wind, north and east, m/s.
     pub(super) wind: [f64; 2],
     /// Tilt of the thrust, rad.
@@ -159,6 +161,7 @@ impl Flat {
             axial: p.propulsion.air.axial_inflow_s_per_m + of("axial_inflow", "gain_s_per_m"),
             lift: lift(p.propulsion.air.translational_lift_s2_per_m2, effects),
             flapping: p.propulsion.air.flapping_moment_n_m_s_per_m + flapping(effects),
+            acts_at_rotors: Present::of(effects).act_at_rotors(),
             wind: ["wind_north_m_s", "wind_east_m_s"].map(|key| of("constant_wind", key)),
             tilt: ["tilt_x_rad", "tilt_y_rad"].map(|key| of("thrust_misalignment", key)),
             rotor_inertia: of("rotor_gyro_torque", "rotor_inertia_kg_m2"),

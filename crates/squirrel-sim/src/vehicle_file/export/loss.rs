@@ -49,6 +49,9 @@ const CLIMB: [f64; 3] = [0.0, 0.0, -2.0];
 const IN_NUMBERS: [&str; 5] =
     ["mass_error", "inertia_error", "thrust_coefficient", "yaw_torque_coeff", "cg_offset"];
 
+/// Effects that can act at the rotors' hubs.
+const AT_HUBS: [&str; 4] = ["linear_drag", "axial_inflow", "translational_lift", "flapping_moment"];
+
 fn difference(a: [[f64; 3]; 2], b: [[f64; 3]; 2]) -> Error {
     let length =
         |i: usize| (0..3).map(|axis| (a[i][axis] - b[i][axis]).powi(2)).sum::<f64>().sqrt();
@@ -229,6 +232,21 @@ fn of_file(file: &VehicleFile, flat: &Flat, keeps: &Keeps, lost: &mut Vec<Lost>)
         air.flapping_moment_n_m_s_per_m != 0.0 && !keeps.flapping,
         "propulsion.flapping_moment_n_m_s_per_m",
         "left out",
+    );
+    let is_central = |name: &str| !matches!(flat::form(&file.effects, name), "" | "at_rotors");
+    let own = [
+        air.axial_inflow_s_per_m,
+        air.translational_lift_s2_per_m2,
+        air.flapping_moment_n_m_s_per_m,
+        p.drag.linear_n_s_per_m.norm(),
+    ];
+    say(
+        keeps.pulls == Pulls::LinearAtHubs
+            && flat.acts_at_rotors
+            && (own.iter().any(|number| *number != 0.0)
+                || AT_HUBS.iter().any(|name| is_central(name))),
+        "drag, inflow, lift and flapping at the centre of mass",
+        "at the hubs, too, as the effects that are there: damp turning",
     );
     say(air.vortex_ring_fraction != 0.0, "propulsion.vortex_ring_fraction", "left out");
     let factors = file.vehicle.rotor_factors();

@@ -1,8 +1,8 @@
 //! `RotorPy` (Folk, Paulos, Kumar 2023): a module with the dictionary `quad_params`, body FLU.
 //!
-//! Rotor drag there goes with rotor speed: the numbers are right at the speed of hover. It acts at the
-//! hubs and damps rotation, which squirrel has as an effect of its own: the module's class `Vehicle`
-//! leaves that out.
+//! Rotor drag there goes with rotor speed and acts at the hubs, so that it damps rotation, as the forms
+//! `at_rotors` of effects do. Of a vehicle without one the numbers are right at the speed of hover, and
+//! the module's class `Vehicle` leaves the damping out.
 
 use super::flat::Flat;
 use super::{Axes, Keeps, Pulls, digits, flat};
@@ -27,16 +27,20 @@ pub(super) const KEEPS: Keeps = Keeps {
 const CLASS: &str = r#"
 
 class Vehicle(Multirotor):
-    """As squirrel flies it: rotor drag does not damp rotation, gravity is 9.80665 m/s^2."""
+    """As squirrel flies it: gravity is 9.80665 m/s^2."""
 
     def __init__(self, **options):
         super().__init__(quad_params, **options)
         self.g = 9.80665
         self.weight = np.array([0.0, 0.0, -self.mass * self.g])
+"#;
 
+/// And what follows it where nothing acts at the hubs.
+const UNDAMPED: &str = r"
+    # Rotor drag does not damp rotation.
     def compute_body_wrench(self, body_rates, rotor_speeds, body_airspeed_vector):
         return super().compute_body_wrench(np.zeros(3), rotor_speeds, body_airspeed_vector)
-"#;
+";
 
 /// # Errors
 /// Another number of rotors than four.
@@ -101,5 +105,8 @@ pub(super) fn text(flat: &Flat, keeps: &Keeps) -> Result<String, String> {
         directions.join(", ")
     );
     out.push_str(CLASS);
+    if !flat.acts_at_rotors {
+        out.push_str(UNDAMPED);
+    }
     Ok(out)
 }

@@ -54,6 +54,22 @@ fn what_a_target_has_not_is_named_with_its_size() {
     assert!(mjcf.remains.hover.moment_n_m < 1e-12);
 }
 
+/// RotorPy has drag at the hubs: then it may damp turning, and elsewhere something is lost.
+#[test]
+fn what_acts_at_the_rotors_does_so_in_rotorpy() {
+    let drag = "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.01\nform = \"at_rotors\"\n";
+    let bare = practice("").text.replace("[0.007, 0.007, 0.008]", "[0.0, 0.0, 0.0]");
+    let file = VehicleFile::parse(&format!("{bare}\n{drag}"), "cf").unwrap();
+    let rotorpy = export(&file, Target::Rotorpy).unwrap();
+    assert!(rotorpy.lost.is_empty(), "{:?}", rotorpy.lost);
+    assert!(!rotorpy.text.contains("np.zeros(3), rotor_speeds"), "{}", rotorpy.text);
+    assert!(rotorpy.remains.forward_5_m_s.force_n < 1e-9, "{:?}", rotorpy.remains);
+    let mixed = export(&practice(drag), Target::Rotorpy).unwrap();
+    assert!(mixed.lost[0].why.contains("damp turning"), "{:?}", mixed.lost);
+    let crazyflow = export(&file, Target::Crazyflow).unwrap();
+    assert!(crazyflow.lost[0].why.contains("damps no turning"), "{:?}", crazyflow.lost);
+}
+
 #[test]
 fn effects_in_numbers_go_everywhere() {
     let file = practice(
