@@ -57,7 +57,7 @@ fn what_a_target_has_not_is_named_with_its_size() {
 /// RotorPy has drag at the hubs: then it may damp turning, and elsewhere something is lost.
 #[test]
 fn what_acts_at_the_rotors_does_so_in_rotorpy() {
-    let drag = "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.01\nform = \"at_rotors\"\n";
+    let drag = "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.01\nextra_drag_z_n_s_per_m = 0.0\nform = \"at_rotors\"\n";
     let bare = practice("").text.replace("[0.007, 0.007, 0.008]", "[0.0, 0.0, 0.0]");
     let file = VehicleFile::parse(&format!("{bare}\n{drag}"), "cf").unwrap();
     let rotorpy = export(&file, Target::Rotorpy).unwrap();
