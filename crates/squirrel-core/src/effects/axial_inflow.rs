@@ -14,7 +14,6 @@ use crate::numbers;
 use crate::vehicle::Vehicle;
 
 const QUADRATIC: usize = 1;
-const AT_ROTORS: usize = 2;
 
 /// Gain of thrust with speed along the rotor axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +33,7 @@ impl<T: Real> Effect<T> for AxialInflow<T> {
         fly: "climbs and descents of 3 m/s with heave doublets, wings folded",
     };
     const SHOWN: Shown = Shown::HORIZONTAL;
-    const AT_ROTORS: Option<usize> = Some(AT_ROTORS);
+    const AT_ROTORS: Option<usize> = Some(2);
 
     fn at_rotors(&self, vehicle: &Vehicle<T>) -> Slopes<T> {
         let none = T::zero();
@@ -59,8 +58,7 @@ numbers! {
 impl<T: Real> AxialInflow<T> {
     pub(super) fn prepare(&self, vehicle: &Vehicle<T>) -> Numbers<T> {
         let [extra, quadratic, form] = self.0;
-        let own = vehicle.parameters().propulsion.air.axial_inflow_s_per_m;
-        let gain = if is(form, AT_ROTORS) { own } else { own + extra };
+        let gain = vehicle.parameters().propulsion.air.axial_inflow_s_per_m + extra;
         Numbers { gain, quadratic: if is(form, QUADRATIC) { quadratic } else { T::zero() } }
     }
 }

@@ -269,11 +269,12 @@ macro_rules! catalogue {
         impl<T: Real> Prepared<T> {
             /// Of a vehicle's effects.
             pub fn new(effects: &Effects<T>, vehicle: &Vehicle<T>) -> Self {
-                let (present, mut slopes) = (Present::of(effects), Slopes::none());
-                $(if let Some(effect) = &effects.$field && <super::$field::$effect<T> as Effect<T>>::AT_ROTORS.is_some_and(|form| present.$field.has(form)) {
+                let (present, mut slopes, mut rest) = (Present::of(effects), Slopes::none(), *effects);
+                $(if let Some(effect) = effects.$field && <super::$field::$effect<T> as Effect<T>>::AT_ROTORS.is_some_and(|form| present.$field.has(form)) {
                     slopes = slopes.plus(effect.at_rotors(vehicle));
+                    rest.$field = None;
                 })+
-                Self { $($($module: effects.$field.unwrap_or_else(|| super::$field::$effect(core::array::from_fn(|_| T::zero()))).prepare(vehicle),)?)+ hubs: at_rotors::Numbers::new(&slopes, vehicle) }
+                Self { $($($module: rest.$field.unwrap_or_else(|| super::$field::$effect(core::array::from_fn(|_| T::zero()))).prepare(vehicle),)?)+ hubs: at_rotors::Numbers::new(&slopes, vehicle) }
             }
         }
 

@@ -15,7 +15,6 @@ use crate::numbers;
 use crate::vehicle::Vehicle;
 
 const SATURATING: usize = 1;
-const AT_ROTORS: usize = 2;
 
 /// Moment per speed across the rotors.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +37,7 @@ impl<T: Real> Effect<T> for FlappingMoment<T> {
     };
     const SHOWN: Shown = Shown::MOMENTS.and(Shown::LASTING);
     const IS_OF_MOMENTS: bool = true;
-    const AT_ROTORS: Option<usize> = Some(AT_ROTORS);
+    const AT_ROTORS: Option<usize> = Some(2);
 
     fn at_rotors(&self, _vehicle: &Vehicle<T>) -> Slopes<T> {
         Slopes { flapping: self.0[0], ..Slopes::none() }
@@ -66,9 +65,6 @@ impl<T: Real> FlappingMoment<T> {
         let [extra, scale, form] = self.0;
         let (gain, none) =
             (vehicle.parameters().propulsion.air.flapping_moment_n_m_s_per_m, T::zero());
-        if is(form, AT_ROTORS) {
-            return Numbers { gain, saturating: none, per_scale: none };
-        }
         if !is(form, SATURATING) {
             return Numbers { gain: gain + extra, saturating: none, per_scale: none };
         }

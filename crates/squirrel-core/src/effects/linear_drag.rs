@@ -17,7 +17,6 @@ use crate::numbers;
 use crate::vehicle::Vehicle;
 
 const ANISOTROPIC: usize = 1;
-const AT_ROTORS: usize = 2;
 
 /// Drag in the rotor plane on top of the vehicle's own.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,7 +42,7 @@ impl<T: Real> Effect<T> for LinearDrag<T> {
         fly: "dashes at several speeds from 2 to 9 m/s, both ways",
     };
     const SHOWN: Shown = Shown::LASTING.and(Shown::HORIZONTAL);
-    const AT_ROTORS: Option<usize> = Some(AT_ROTORS);
+    const AT_ROTORS: Option<usize> = Some(2);
 
     fn at_rotors(&self, _vehicle: &Vehicle<T>) -> Slopes<T> {
         let [drag, _, drag_z, _] = self.0;
@@ -65,8 +64,6 @@ impl<T: Real> LinearDrag<T> {
         Numbers {
             slope: if is(form, ANISOTROPIC) {
                 [drag * (T::one() + anisotropy), drag * (T::one() - anisotropy), drag_z]
-            } else if is(form, AT_ROTORS) {
-                [T::zero(); 3]
             } else {
                 [drag, drag, T::zero()]
             },

@@ -338,7 +338,8 @@ pub trait Effect<T: Real>: Copy {
     /// Whether each form beyond the standard one is an equation of its own, that a batch has a
     /// place for or not.
     const FORMS_APART: bool = false;
-    /// The number of its form that acts at the rotors' hubs.
+    /// The number of its form that acts at the rotors' hubs, by [`Effect::at_rotors`] alone: its own
+    /// equation has the vehicle's numbers then.
     const AT_ROTORS: Option<usize> = None;
 
     /// Whether a vehicle has some of it as a number of its own, to which the effect adds.

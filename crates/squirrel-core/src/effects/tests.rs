@@ -51,6 +51,22 @@ fn wrench_of(effects: &Effects<f64>) -> Wrench<Body, f64> {
     };
     acting.numbers().wrench(acting.present(), &at).into()
 }
+/// With nothing but air and four rotors.
+fn in_flow(acting: &Acting<f64>, flow: &Airflow<f64>, rotor_rad_s: f64) -> BodyWrench<f64> {
+    let at = Situation {
+        flow,
+        omega: &flow.omega,
+        thrust_n: 5.0,
+        rotor_speed: &[rotor_rad_s; 4],
+        thrust_factor: 1.0,
+        force: [0.0; 3],
+        wing_force: [0.0; 3],
+        rotor_spin: [0.0; 2],
+        wings: &flat_plate::Pair::new(&WING),
+        deployment: [0.0; 2],
+    };
+    acting.numbers().wrench(acting.present(), &at)
+}
 fn wind_at(effects: &Effects<f64>, height_m: f64) -> [f64; 2] {
     let acting = Acting::new(effects, &vehicle());
     acting.numbers().wind(acting.present(), height_m)
@@ -435,19 +451,7 @@ fn what_acts_at_the_rotors_damps_turning() {
     let hover = (vehicle.weight_n() / thrust).sqrt();
     let at = |effects: &Effects<f64>, flow: &Airflow<f64>, times: f64| {
         let acting = Acting::new(effects, &vehicle);
-        let situation = Situation {
-            flow,
-            omega: &flow.omega,
-            thrust_n: 5.0,
-            rotor_speed: &[times * hover; 4],
-            thrust_factor: 1.0,
-            force: [0.0; 3],
-            wing_force: [0.0; 3],
-            rotor_spin: [0.0; 2],
-            wings: &flat_plate::Pair::new(&WING),
-            deployment: [0.0; 2],
-        };
-        let wrench = acting.numbers().wrench(acting.present(), &situation);
+        let wrench = in_flow(&acting, flow, times * hover);
         (Vector3::from(wrench.force), Vector3::from(wrench.moment))
     };
     let flow = |velocity: Vector3<f64>, omega: Vector3<f64>| {
@@ -517,19 +521,7 @@ fn what_a_vehicle_declares_of_its_rotors_acts_as_the_effect_does() {
     let acts = |vehicle: &Vehicle<f64>, effects: &Effects<f64>| {
         let acting = Acting::new(effects, vehicle);
         let factor = acting.numbers().thrust_factor(acting.present(), &flow, HEIGHT_M);
-        let at = Situation {
-            flow: &flow,
-            omega: &flow.omega,
-            thrust_n: 5.0,
-            rotor_speed: &[1443.0; 4],
-            thrust_factor: 1.0,
-            force: [0.0; 3],
-            wing_force: [0.0; 3],
-            rotor_spin: [0.0; 2],
-            wings: &flat_plate::Pair::new(&WING),
-            deployment: [0.0; 2],
-        };
-        (factor, acting.numbers().wrench(acting.present(), &at).moment)
+        (factor, in_flow(&acting, &flow, 1443.0).moment)
     };
     let (plain, none) = (vehicle(), Effects::none());
     let (factor, moment) = acts(&declaring(1.0), &none);

@@ -14,7 +14,6 @@ use crate::vehicle::Vehicle;
 
 const LINEAR: usize = 1;
 const QUADRATIC: usize = 2;
-const AT_ROTORS: usize = 3;
 /// Where the standard form saturates, s^2/m^2.
 const SATURATION: f64 = 0.004;
 
@@ -38,7 +37,7 @@ impl<T: Real> Effect<T> for TranslationalLift<T> {
         fly: "dashes to 9 m/s at constant height with the wings folded",
     };
     const SHOWN: Shown = Shown::HORIZONTAL;
-    const AT_ROTORS: Option<usize> = Some(AT_ROTORS);
+    const AT_ROTORS: Option<usize> = Some(3);
 
     fn at_rotors(&self, vehicle: &Vehicle<T>) -> Slopes<T> {
         Slopes { lift: self.0[0] * vehicle.weight_n(), ..Slopes::none() }
@@ -70,8 +69,6 @@ impl<T: Real> TranslationalLift<T> {
             Numbers { gain, endless: none, linear }
         } else if is(form, QUADRATIC) {
             Numbers { gain, endless: extra, linear: none }
-        } else if is(form, AT_ROTORS) {
-            Numbers { gain, endless: none, linear: none }
         } else {
             Numbers { gain: gain + extra, endless: none, linear: none }
         }

@@ -245,6 +245,8 @@ fn the_better_controller_comes_through_the_forest() {
     let plan = Plan { arms, ..plan(trials) };
     let study = &forest::run(&plan, 2.0, &Keep::default()).unwrap().unwrap();
     let row = |arm: &str| study.rows.iter().find(|row| row.arm == arm).unwrap();
+    // `phantom` flies beside them.
+    assert_eq!(study.rows.len(), papers.len() + 2);
     let best = papers.iter().map(|arm| row(arm).in_band.share.value).fold(0.0, f64::max);
     let ours = row("twcc_plus").in_band.share;
     assert!(ours.value >= 1.5 * best && ours.low > best, "{ours:?}, the paper's best {best}");

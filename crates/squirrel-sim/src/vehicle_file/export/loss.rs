@@ -4,7 +4,7 @@ use super::flat::{self, Flat, SPEED_M_S};
 use super::{Axes, Keeps, Pulls};
 use crate::vehicle_file::VehicleFile;
 use serde::Serialize;
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{Effects, forms};
 
 /// How far off a force and a moment are, each the length of the difference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -48,9 +48,6 @@ const CLIMB: [f64; 3] = [0.0, 0.0, -2.0];
 /// Effects that are in the numbers of every target.
 const IN_NUMBERS: [&str; 5] =
     ["mass_error", "inertia_error", "thrust_coefficient", "yaw_torque_coeff", "cg_offset"];
-
-/// Effects that can act at the rotors' hubs.
-const AT_HUBS: [&str; 4] = ["linear_drag", "axial_inflow", "translational_lift", "flapping_moment"];
 
 fn difference(a: [[f64; 3]; 2], b: [[f64; 3]; 2]) -> Error {
     let length =
@@ -233,7 +230,12 @@ fn of_file(file: &VehicleFile, flat: &Flat, keeps: &Keeps, lost: &mut Vec<Lost>)
         "propulsion.flapping_moment_n_m_s_per_m",
         "left out",
     );
-    let is_central = |name: &str| !matches!(flat::form(&file.effects, name), "" | "at_rotors");
+    let is_central = |name: &str| {
+        let known = forms(Effects::<f64>::parameters(name).unwrap_or_default());
+        file.effects.has(name)
+            && known.contains(&"at_rotors")
+            && flat::form(&file.effects, name) != "at_rotors"
+    };
     let own = [
         air.axial_inflow_s_per_m,
         air.translational_lift_s2_per_m2,
@@ -244,7 +246,7 @@ fn of_file(file: &VehicleFile, flat: &Flat, keeps: &Keeps, lost: &mut Vec<Lost>)
         keeps.pulls == Pulls::LinearAtHubs
             && flat.acts_at_rotors
             && (own.iter().any(|number| *number != 0.0)
-                || AT_HUBS.iter().any(|name| is_central(name))),
+                || Effects::<f64>::NAMES.iter().any(|name| is_central(name))),
         "drag, inflow, lift and flapping at the centre of mass",
         "at the hubs, too, as the effects that are there: damp turning",
     );
