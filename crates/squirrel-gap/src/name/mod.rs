@@ -10,6 +10,7 @@
 //! 3. What is left is held against what noise leaves ([`crate::leftover`]); intervals come from
 //!    blocks ([`interval`]). Names stand or fall by both and by held-out flights ([`standing`]).
 
+mod ahead;
 mod column;
 mod day;
 mod evidence;

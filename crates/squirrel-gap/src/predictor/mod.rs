@@ -16,6 +16,7 @@
 
 mod actuators;
 mod commands;
+mod innovations;
 mod kept;
 mod noise;
 mod slope;
@@ -547,6 +548,14 @@ fn lead(
 /// Residual of the dynamics of a piece.
 fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<Vector6<f64>> {
     let filter = if path.stride == 1 { &track.filter } else { &track.model_filter };
+    let predicted = predicted(plant, track, motion, path);
+    let filtered = filter.apply(&predicted, track.edge() - path.first, track.every);
+    track.measured.iter().zip(filtered).map(|(measured, model)| measured - model).collect()
+}
+
+/// Specific force and angular acceleration, as the sensors would have them, at each moment of the
+/// path.
+fn predicted(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<Vector6<f64>> {
     let mut jumps = path.before.iter().filter(|_| actuators::jumps(plant.effects())).peekable();
     let mut predicted = Vec::with_capacity(path.moments.len());
     let [rate_scale, _] = track.scales(plant.effects());
@@ -564,6 +573,5 @@ fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<V
         let a = a.vector.component_mul(&rate_scale);
         predicted.push(Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z));
     });
-    let filtered = filter.apply(&predicted, track.edge() - path.first, track.every);
-    track.measured.iter().zip(filtered).map(|(measured, model)| measured - model).collect()
+    predicted
 }

@@ -9,6 +9,7 @@ mod clean_flights;
 mod data_problems;
 mod errors;
 mod far_off;
+mod feedback;
 mod file_with_effects;
 mod first_file;
 mod first_screen;
