@@ -77,9 +77,11 @@ fn tested(copy: &Path, name: &str) -> Result<(), String> {
         command.args(["--config", &format!("profile.release.package.{name}.opt-level=1")]);
     }
     command.args(
-        ["squirrel-py", "squirrel-sim", "hidden-effects"].iter().flat_map(|name| ["-p", name]),
+        ["squirrel-py", "squirrel-sim", "squirrel-batch", "hidden-effects"]
+            .iter()
+            .flat_map(|name| ["-p", name]),
     );
-    command.args(["--test", "it", "--test", "batch", "--"]).args(TESTS);
+    command.args(["--test", "it", "--"]).args(TESTS);
     let done =
         command.stderr(Stdio::inherit()).output().map_err(|error| format!("cargo: {error}"))?;
     let said = String::from_utf8_lossy(&done.stdout);

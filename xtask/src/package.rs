@@ -8,12 +8,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What is published on crates.io, in the order in which it can be.
-const CRATES: [&str; 10] = [
+const CRATES: [&str; 11] = [
     "squirrel-vehicles",
     "squirrel-core",
     "squirrel-log",
     "squirrel-report",
     "squirrel-sim",
+    "squirrel-batch",
     "squirrel-nn",
     "squirrel-plan",
     "squirrel-gap",

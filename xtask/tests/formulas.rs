@@ -120,12 +120,12 @@ const DENSITY: [&str; 11] = [
 /// What a file calls, without spaces, instead of writing it again.
 const CALLS: [(&str, &[&str]); 8] = [
     (
-        "sim/src/batch/dynamics.rs",
+        "batch/src/dynamics.rs",
         &["derivative(&airframe", "whole::step::<", "whole::air::<", "servo.lead(", "packs.step("],
     ),
-    ("sim/src/batch/battery.rs", &["pack.discharge(", "pack.settle("]),
+    ("batch/src/battery.rs", &["pack.discharge(", "pack.settle("]),
     (
-        "sim/src/batch/autopilot.rs",
+        "batch/src/autopilot.rs",
         &[
             "filter.step(",
             "Target::from_euler(",

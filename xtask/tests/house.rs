@@ -10,7 +10,7 @@ use std::fs;
 use std::path::Path;
 
 /// Which of our crates a crate may depend on, top down.
-const ARROWS: [(&str, &[&str]); 13] = [
+const ARROWS: [(&str, &[&str]); 14] = [
     (
         "squirrel-examples",
         &[
@@ -27,6 +27,7 @@ const ARROWS: [(&str, &[&str]); 13] = [
     (
         "squirrel-py",
         &[
+            "squirrel-batch",
             "squirrel-cli",
             "squirrel-study",
             "squirrel-gap",
@@ -66,6 +67,7 @@ const ARROWS: [(&str, &[&str]); 13] = [
     ("squirrel-gap", &["squirrel-sim", "squirrel-report", "squirrel-log", "squirrel-core"]),
     ("squirrel-nn", &["squirrel-sim", "squirrel-log", "squirrel-core"]),
     ("squirrel-plan", &["squirrel-sim", "squirrel-report", "squirrel-log", "squirrel-core"]),
+    ("squirrel-batch", &["squirrel-sim", "squirrel-core"]),
     ("squirrel-sim", &["squirrel-log", "squirrel-core", "squirrel-vehicles"]),
     ("squirrel-report", &["squirrel-log"]),
     ("squirrel-log", &["squirrel-core", "squirrel-vehicles"]),
@@ -181,6 +183,7 @@ fn every_crate_and_every_room_of_core_and_sim_is_on_the_page() {
         "crates/squirrel-log",
         "crates/squirrel-report",
         "crates/squirrel-sim",
+        "crates/squirrel-batch",
     ] {
         rooms.extend(
             folders(&root.join(package).join("src"))

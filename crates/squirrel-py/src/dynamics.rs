@@ -10,12 +10,12 @@ use crate::vehicle::Vehicle;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
+use squirrel_batch::BODY_NUMBERS;
 use squirrel_core::dynamics::{self, Held, RotorDrive, State, rk4};
 use squirrel_core::effects::Acting;
 use squirrel_core::frames::{In, Wrench};
 use squirrel_core::vehicle::MAX_ROTORS;
 use squirrel_core::{nalgebra::Vector3, vehicle};
-use squirrel_sim::batch::BODY_NUMBERS;
 
 /// What a call is about.
 struct Model<'py> {

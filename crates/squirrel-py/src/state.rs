@@ -4,11 +4,11 @@ use crate::arguments::{Float, Rows};
 use crate::error::value;
 use nalgebra::{Quaternion, Vector3};
 use pyo3::PyResult;
+use squirrel_batch::BODY_NUMBERS;
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::math::Real;
 use squirrel_core::vehicle::MAX_ROTORS;
-use squirrel_sim::batch::BODY_NUMBERS;
 
 /// How far from 1 the norm of an attitude may be.
 const NORM_SLACK: f64 = 1e-3;

@@ -1,4 +1,4 @@
-//! Environments: `squirrel_sim::task` as arrays. `squirrel.envs` makes Gymnasium's classes of it.
+//! Environments: `squirrel_batch::task` as arrays. `squirrel.envs` makes Gymnasium's classes of it.
 
 use crate::arguments::{Array32, Numbers, rows};
 use crate::batch::{scheme_name, settings};
@@ -14,11 +14,11 @@ use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
+use squirrel_batch::Settings;
+use squirrel_batch::task::course::{CourseKind, Terms};
+use squirrel_batch::task::{Level, Outcome, TaskSettings, Tasks as Environments};
 use squirrel_core::policy::OBSERVATION;
-use squirrel_sim::batch::Settings;
-use squirrel_sim::batch::simd::Path;
-use squirrel_sim::task::course::{CourseKind, Terms};
-use squirrel_sim::task::{Level, Outcome, TaskSettings, Tasks as Environments};
+use squirrel_sim::simd::Path;
 use std::sync::{Mutex, MutexGuard};
 
 /// Rotors of the vehicles.

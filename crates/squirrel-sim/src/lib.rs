@@ -1,13 +1,12 @@
-//! The simulator of squirrel: plant, world, sensors, the flight in closed loop, batches of
-//! vehicles.
+//! The simulator of squirrel: plant, world, sensors, the flight in closed loop.
 //!
 //! - [`flight`] closes the loop: [`plant`] (and [`world`] near contact) moves, [`sensors`] measure,
 //!   the flight code of `squirrel-core` commands, the log records. [`replay`] runs the flight code
 //!   again on a log's inputs.
 //! - [`vehicle_file`], [`weights`] and [`scenario`] read what to fly; [`arm`] says who flies;
 //!   [`faults`] breaks sensors in recorded frames; [`track`] is a plan to follow.
-//! - [`batch`] flies thousands of vehicles at once on wide registers, [`task`] makes environments
-//!   of it in which policies learn.
+//! - [`simd`] asks the processor for its registers, on which `squirrel-batch` flies thousands of
+//!   vehicles at once, with the numbers that [`tape`] writes and reads.
 //!
 //! ```
 //! use squirrel_sim::arm::Arm;
@@ -27,7 +26,6 @@
 //! ```
 
 pub mod arm;
-pub mod batch;
 pub mod estimator;
 pub mod faults;
 pub mod flight;
@@ -37,8 +35,8 @@ pub mod replay;
 pub mod scenario;
 pub mod sensors;
 pub mod setting;
-mod tape;
-pub mod task;
+pub mod simd;
+pub mod tape;
 pub mod track;
 pub mod vehicle_file;
 pub mod weights;

@@ -8,19 +8,21 @@ use squirrel_core::math::Real;
 /// A tape that is written or read. What is read is `None` where the tape ends too soon or says
 /// something that cannot be.
 #[derive(Debug)]
-pub(crate) enum Tape<'a> {
+pub enum Tape<'a> {
+    /// What is written.
     Write(&'a mut Vec<u8>),
     /// What is left.
     Read(&'a [u8]),
 }
 
 impl Tape<'_> {
-    pub(crate) fn is_read(&self) -> bool {
+    /// Whether it is read.
+    pub fn is_read(&self) -> bool {
         matches!(self, Self::Read(_))
     }
 
     /// Nothing is left to read.
-    pub(crate) fn is_over(&self) -> bool {
+    pub fn is_over(&self) -> bool {
         matches!(self, Self::Read([]))
     }
 
@@ -32,14 +34,16 @@ impl Tape<'_> {
         Some(())
     }
 
-    pub(crate) fn word(&mut self, x: &mut u64) -> Option<()> {
+    /// A whole number.
+    pub fn word(&mut self, x: &mut u64) -> Option<()> {
         let mut bytes = x.to_le_bytes();
         self.raw(&mut bytes)?;
         *x = u64::from_le_bytes(bytes);
         Some(())
     }
 
-    pub(crate) fn long(&mut self, x: &mut u128) -> Option<()> {
+    /// A long whole number.
+    pub fn long(&mut self, x: &mut u128) -> Option<()> {
         let mut bytes = x.to_le_bytes();
         self.raw(&mut bytes)?;
         *x = u128::from_le_bytes(bytes);
@@ -47,36 +51,40 @@ impl Tape<'_> {
     }
 
     /// A number of things.
-    pub(crate) fn count(&mut self, x: usize) -> Option<usize> {
+    pub fn count(&mut self, x: usize) -> Option<usize> {
         let mut word = x as u64;
         self.word(&mut word)?;
         usize::try_from(word).ok()
     }
 
     /// What must be the same on both sides.
-    pub(crate) fn same(&mut self, x: usize) -> Option<()> {
+    pub fn same(&mut self, x: usize) -> Option<()> {
         (self.count(x)? == x).then_some(())
     }
 
-    pub(crate) fn flag(&mut self, x: &mut bool) -> Option<()> {
+    /// Yes or no.
+    pub fn flag(&mut self, x: &mut bool) -> Option<()> {
         let mut byte = [u8::from(*x)];
         self.raw(&mut byte)?;
         *x = byte[0] == 1;
         (byte[0] <= 1).then_some(())
     }
 
-    pub(crate) fn double(&mut self, x: &mut f64) -> Option<()> {
+    /// A number in 8 bytes.
+    pub fn double(&mut self, x: &mut f64) -> Option<()> {
         let mut bytes = x.to_le_bytes();
         self.raw(&mut bytes)?;
         *x = f64::from_le_bytes(bytes);
         Some(())
     }
 
-    pub(crate) fn doubles<'x>(&mut self, all: impl IntoIterator<Item = &'x mut f64>) -> Option<()> {
+    /// Numbers in 8 bytes each.
+    pub fn doubles<'x>(&mut self, all: impl IntoIterator<Item = &'x mut f64>) -> Option<()> {
         all.into_iter().try_for_each(|x| self.double(x))
     }
 
-    pub(crate) fn single(&mut self, x: &mut f32) -> Option<()> {
+    /// A number in 4 bytes.
+    pub fn single(&mut self, x: &mut f32) -> Option<()> {
         let mut bytes = x.to_le_bytes();
         self.raw(&mut bytes)?;
         *x = f32::from_le_bytes(bytes);
@@ -84,7 +92,7 @@ impl Tape<'_> {
     }
 
     /// A number of either scalar, in its own width.
-    pub(crate) fn real<S: Real>(&mut self, x: &mut S) -> Option<()> {
+    pub fn real<S: Real>(&mut self, x: &mut S) -> Option<()> {
         let mut wide = try_convert::<S, f64>(*x).unwrap_or(f64::NAN);
         if size_of::<S>() == size_of::<f32>() {
             let mut narrow = wide as f32;
@@ -99,16 +107,20 @@ impl Tape<'_> {
         Some(())
     }
 
-    pub(crate) fn reals<S: Real>(&mut self, all: &mut [S]) -> Option<()> {
+    /// Numbers of either scalar.
+    pub fn reals<S: Real>(&mut self, all: &mut [S]) -> Option<()> {
         all.iter_mut().try_for_each(|x| self.real(x))
     }
 
-    pub(crate) fn rows<S: Real>(&mut self, rows: &mut [Row<S>]) -> Option<()> {
+    /// Rows of a block of a batch.
+    pub fn rows<S: Real>(&mut self, rows: &mut [Row<S>]) -> Option<()> {
         rows.iter_mut().try_for_each(|row: &mut [S; BLOCK]| self.reals(row))
     }
 }
 
 /// The rows of a structure of `squirrel_core::numbers`.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! on_tape {
     ($tape:expr, $place:expr) => {{
         let (tape, fine) = (std::cell::RefCell::new(&mut *$tape), std::cell::Cell::new(true));
@@ -119,7 +131,8 @@ macro_rules! on_tape {
         fine.get().then_some(())
     }};
 }
-pub(crate) use on_tape;
+#[doc(hidden)]
+pub use on_tape;
 
 #[cfg(test)]
 mod tests {

@@ -2,38 +2,38 @@
 #![cfg(unix)]
 
 use super::support::Folder;
-use nix::pty::{Winsize, openpty};
-use std::fs::File;
-use std::io::Read;
-use std::process::{Command, Stdio};
+use std::path::PathBuf;
+use std::process::Command;
 
-/// A terminal: the end that a user looks at, and the one that a program writes to.
-fn terminal() -> (File, File) {
-    let size = Winsize { ws_row: 30, ws_col: 100, ws_xpixel: 0, ws_ypixel: 0 };
-    let ends = openpty(Some(&size), None).unwrap();
-    // Copies, which other children do not inherit, unlike what the system gives.
-    let [user, program] = [ends.master, ends.slave].map(|end| end.try_clone().unwrap());
-    (File::from(user), File::from(program))
-}
+/// A terminal of Python's standard library: a crate that opens one asks features of `libc` that the
+/// program does not have, and cargo would compile all of it twice.
+const TERMINAL: &str = r#"
+import fcntl, os, struct, subprocess, sys, termios
+user, program = os.openpty()
+fcntl.ioctl(program, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 0, 0))
+child = subprocess.Popen(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=program)
+os.close(program)
+try:
+    while piece := os.read(user, 4096):
+        sys.stdout.buffer.write(piece)
+except OSError:
+    pass  # how Linux says that the program has closed its end
+sys.exit(child.wait())
+"#;
 
 /// What a command writes to stderr where that is a terminal.
 fn shown(folder: &Folder, arguments: &[&str]) -> String {
-    let (mut user, program) = terminal();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_squirrel"))
+    let python = std::env::var_os("SQUIRREL_PYTHON").map_or("python3".into(), PathBuf::from);
+    let done = Command::new(python)
+        .args(["-c", TERMINAL, env!("CARGO_BIN_EXE_squirrel")])
         .args(arguments)
         .current_dir(&folder.0)
         .env("TERM", "xterm")
-        .stdout(Stdio::null())
-        .stderr(program)
-        .spawn()
+        .output()
         .unwrap();
-    // Until the program has closed its end, which reads as an error on Linux.
-    let (mut text, mut piece) = (Vec::new(), [0; 4096]);
-    while let Ok(length @ 1..) = user.read(&mut piece) {
-        text.extend_from_slice(&piece[..length]);
-    }
-    let text = String::from_utf8_lossy(&text).into_owned();
-    assert!(child.wait().unwrap().success(), "{arguments:?}: {text}");
+    let text = String::from_utf8_lossy(&done.stdout).into_owned();
+    let problem = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success(), "{arguments:?}: {text} {problem}");
     text
 }
 

@@ -10,7 +10,7 @@
 use super::column::Column;
 use super::factor::Factor;
 use nalgebra::{DMatrix, DVector};
-use squirrel_sim::batch::simd::{BLOCK, Kernel, Path, Paths, Register};
+use squirrel_sim::simd::{BLOCK, Kernel, Path, Paths, Register};
 use std::borrow::Cow;
 
 /// Tempering of the likelihood.

@@ -7,7 +7,7 @@
 //! takes its windows in order and each window its ticks in order, and the sixteen columns are added
 //! as a tree at the end.
 
-pub use squirrel_sim::batch::simd;
+pub use squirrel_sim::simd;
 mod tape;
 #[cfg(test)]
 mod tests;

@@ -9,12 +9,12 @@ use crate::vehicle::Vehicle;
 use nalgebra::{Vector3, convert};
 use numpy::{PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use squirrel_batch::{BODY_NUMBERS, Batch, BatchError, BatchVehicle, Settings};
 use squirrel_core::effects::GUST_TIME_CONSTANT_S;
 use squirrel_core::frames::In;
 use squirrel_core::vehicle::{RotorAir, Vehicle as Airframe};
-use squirrel_sim::batch::simd::Paths;
-use squirrel_sim::batch::{BODY_NUMBERS, Batch, BatchError, BatchVehicle, Settings};
 use squirrel_sim::plant::{GustModel, WindParameters, WingPlant};
+use squirrel_sim::simd::Paths;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! Many vehicles at once: `squirrel_sim::batch` behind one class for both scalars and all numbers
+//! Many vehicles at once: `squirrel_batch` behind one class for both scalars and all numbers
 //! of rotors.
 
 mod any_batch;
@@ -15,7 +15,7 @@ use any_batch::{AnyBatch, advance, air, check_wind};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
-use squirrel_sim::batch::{BatchVehicle, Settings};
+use squirrel_batch::{BatchVehicle, Settings};
 use std::sync::Mutex;
 
 pub(crate) use make::{scheme_name, settings};

@@ -8,7 +8,7 @@ use crate::vehicle::Vehicle;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
-use squirrel_sim::batch::BODY_NUMBERS;
+use squirrel_batch::BODY_NUMBERS;
 
 /// Fly many vehicles under given commands and keep every motion.
 ///

@@ -141,7 +141,7 @@ fn both(air: &Air<f64>) -> Airflow<Pair> {
 
 impl MembraneParameters {
     /// What the equations take of these.
-    pub(crate) fn numbers(&self) -> membrane::Membrane<f64> {
+    pub fn numbers(&self) -> membrane::Membrane<f64> {
         let eighth = self.prestrain / 8.0;
         membrane::Membrane {
             force_scale: 0.5 * AIR_DENSITY_KG_M3 * self.area_per_side_m2 * self.force_gain,

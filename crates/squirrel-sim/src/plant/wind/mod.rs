@@ -175,7 +175,7 @@ impl Wind {
     }
 
     /// Whether gusts depend on how a vehicle meets them.
-    pub(crate) fn asks_the_vehicle(&self) -> bool {
+    pub fn asks_the_vehicle(&self) -> bool {
         self.mil.is_some()
             || self.parameters.gust_sigma_m_s != 0.0
                 && matches!(self.parameters.gust, GustModel::Dryden { .. })
@@ -221,12 +221,12 @@ impl Wind {
     }
 
     /// Any, to be read from a tape.
-    pub(crate) fn blank() -> Self {
+    pub fn blank() -> Self {
         Self::new(WindParameters::calm(), 1.0, 0)
     }
 
     /// All that it is, but for what it has computed before and would again.
-    pub(crate) fn keep(&mut self, tape: &mut Tape<'_>) -> Option<()> {
+    pub fn keep(&mut self, tape: &mut Tape<'_>) -> Option<()> {
         let p = &mut self.parameters;
         tape.doubles(&mut p.mean_ned_m_s)?;
         tape.double(&mut p.gust_sigma_m_s)?;
