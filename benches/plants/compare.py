@@ -244,7 +244,7 @@ time = { column = "t", unit = "s" }
 """
 
 
-def fly(params, more, known, path, cell_v, cells, rng):
+def fly(params, more, known, path, cell_v, cells, gyro_rad_s, rng):
     """One flight as rows of `COLUMNS`; the controller has the file's parameters, and sensors are in the middle of the rotors."""
     start, dt = path.update(0.0), 1.0 / RATE_HZ
     state = {"x": np.array(start["x"], float), "v": np.array(start["x_dot"], float), "q": np.array([0.0, 0.0, 0.0, 1.0])}
@@ -263,7 +263,7 @@ def fly(params, more, known, path, cell_v, cells, rng):
         turned, w = Rotation.from_quat(state["q"]), state["w"]
         x = state["x"] + turned.apply(shift) + noise(0.002)
         v = state["v"] + turned.apply(np.cross(w, shift)) + noise(0.01)
-        gyro = w + noise(0.003)
+        gyro = w + noise(gyro_rad_s)
         asked = np.clip(control.update(t, {"x": x, "v": v, "q": state["q"], "w": gyro}, path.update(t))["cmd_motor_speeds"], 0.0, top)
         voltage = cells * (cell_v - 0.5 * t / FLIGHT_S)
         given = np.clip(asked * (voltage / (3.7 * cells)) ** more.get("exponent", 0.0), 0.0, top)
@@ -279,7 +279,7 @@ def fly(params, more, known, path, cell_v, cells, rng):
     return rows
 
 
-def case(squirrel, name, effect, seed, folder):
+def case(squirrel, name, effect, seed, gyro_rad_s, folder):
     """What the workflow says of one machine with one effect."""
     rng = np.random.default_rng([seed, list(MACHINES).index(name), list(EFFECTS).index(effect)])
     size, speed, _ = MACHINES[name]
@@ -290,7 +290,7 @@ def case(squirrel, name, effect, seed, folder):
     logs = []
     for number, kind in enumerate(KINDS):
         path = trajectory(kind, size * rng.uniform(0.8, 1.2), speed * rng.uniform(0.8, 1.2), rng)
-        rows = fly(params, more, known, path, 4.1 - 0.1 * number, CELLS[name], rng)
+        rows = fly(params, more, known, path, 4.1 - 0.1 * number, CELLS[name], gyro_rad_s, rng)
         csv, log = folder / f"{kind}.csv", folder / f"{kind}.mcap"
         np.savetxt(csv, rows, delimiter=",", header=COLUMNS, comments="", fmt="%.7g")
         subprocess.run([squirrel, "import", "--map", folder / "map.toml", csv, "--out", log], check=True, capture_output=True)
@@ -318,6 +318,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--squirrel", type=Path, required=True)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--gyro-rad-s", type=float, default=0.003, help="noise of the gyroscope, which the controller feeds back")
     parser.add_argument("--machine", choices=MACHINES, action="append")
     parser.add_argument("--effect", choices=EFFECTS, action="append")
     parser.add_argument("--keep", type=Path, help="folder for the cases")
@@ -330,7 +331,7 @@ def main():
                 folder = Path(arguments.keep or temporary) / f"{name}-{effect.replace(' ', '-')}-{arguments.seed}"
                 folder.mkdir(parents=True, exist_ok=True)
                 try:
-                    verdict = case(squirrel, name, effect, arguments.seed, folder)
+                    verdict = case(squirrel, name, effect, arguments.seed, arguments.gyro_rad_s, folder)
                 except Lost:
                     print(f"{name:17} {effect:23} not flown: the controller loses it", flush=True)
                     continue
@@ -343,7 +344,7 @@ def main():
     count = {kind: sum(row["is"] == kind for row in results) for kind in ("right", "first", "flagged", "missed", "wrong")}
     print(f"{len(results)} cases: " + ", ".join(f"{kind} {n}" for kind, n in count.items()))
     if arguments.json:
-        arguments.json.write_text(json.dumps({"seed": arguments.seed, "count": count, "cases": results}, indent=1) + "\n")
+        arguments.json.write_text(json.dumps({"seed": arguments.seed, "gyro_rad_s": arguments.gyro_rad_s, "count": count, "cases": results}, indent=1) + "\n")
 
 
 if __name__ == "__main__":

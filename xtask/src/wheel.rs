@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What builds and tests the wheel, what it can use where it is there, what runs notebooks, and
-/// studies in parts.
-const PACKAGES: &str = "numpy==2.4.6 maturin==1.16.0 pytest==9.2.0 mypy==2.4.1 matplotlib==3.11.2 pandas==3.1.1 polars==2.1.0 gymnasium==1.4.0 nbclient==0.11.0 ipykernel==7.4.0 distributed==2026.8.0 ray==2.60.0";
+/// studies in parts. Tests run on two processors, most of them on one thread.
+const PACKAGES: &str = "numpy==2.4.6 maturin==1.16.0 pytest==9.2.0 pytest-xdist==3.8.0 mypy==2.4.1 matplotlib==3.11.2 pandas==3.1.1 polars==2.1.0 gymnasium==1.4.0 nbclient==0.11.0 ipykernel==7.4.0 distributed==2026.8.0 ray==2.60.0";
 /// Largest wheel.
 const BYTES_MAX: u64 = 8_000_000;
 
@@ -70,7 +70,7 @@ fn run(arguments: &[String]) -> Result<String, String> {
             // Drawing needs no screen, and the repository stays as it is.
             .env("MPLBACKEND", "agg")
             .env("PYTHONDONTWRITEBYTECODE", "1")
-            .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
+            .args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", "2", "--dist", "worksteal"])
             .args(arguments),
     )?;
     Ok(size)
