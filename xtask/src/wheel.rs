@@ -70,7 +70,17 @@ fn run(arguments: &[String]) -> Result<String, String> {
             // Drawing needs no screen, and the repository stays as it is.
             .env("MPLBACKEND", "agg")
             .env("PYTHONDONTWRITEBYTECODE", "1")
-            .args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", "2", "--dist", "worksteal"])
+            .args([
+                "-m",
+                "pytest",
+                "-q",
+                "-p",
+                "no:cacheprovider",
+                "-n",
+                "2",
+                "--dist",
+                "worksteal",
+            ])
             .args(arguments),
     )?;
     Ok(size)

@@ -40,8 +40,8 @@ pub(crate) fn standing(
     naming: Naming,
     hold: impl Fn(&Naming) -> Result<Option<Vec<Held>>, GapError>,
 ) -> Result<Naming, GapError> {
-    let naming = slow::beside_drift(search, naming)?;
-    let naming = held(search, foretelling(search, clear(search, naming)?)?, &hold)?;
+    let naming = foretelling(search, slow::beside_drift(search, naming)?)?;
+    let naming = held(search, clear(search, naming)?, &hold)?;
     // What is left of forces alone, or of moments, may be one missing effect: names must explain
     // most of what is there.
     let most = |leftover: &Leftover| leftover.is_in_all || Left::of(leftover).share_removed >= MOST;
@@ -108,13 +108,20 @@ fn clear(search: &Search<'_>, naming: Naming) -> Result<Naming, GapError> {
     dropping(search, naming, |naming| Ok(search.least_clear(naming)))
 }
 
-/// An explanation that leaves nothing without those delays and lags that do not help to foretell
-/// the gyroscope: what fits its noise in the commands.
+/// An explanation without those delays and lags that do not help to foretell the gyroscope, whatever
+/// is left then: what fits its noise in the commands.
 ///
 /// # Errors
 /// What the predictor says.
-fn foretelling(search: &Search<'_>, naming: Naming) -> Result<Naming, GapError> {
-    dropping(search, naming, |naming| search.least_foretold(naming))
+fn foretelling(search: &Search<'_>, mut naming: Naming) -> Result<Naming, GapError> {
+    while naming.gust_m_s.is_none()
+        && let Some(worst) = search.least_foretold(&naming)?
+    {
+        let mut kept = naming.found.best.members.clone();
+        kept.remove(worst);
+        naming = only(search, &naming, &kept)?;
+    }
+    Ok(naming)
 }
 
 /// An explanation that leaves nothing without those names that held-out flights are predicted
