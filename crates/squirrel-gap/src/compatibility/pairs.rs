@@ -320,25 +320,15 @@ fn best_naming(r: &[[f64; 3]; 3]) -> (f64, Naming) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Numbers from -1 to 1 that look like chance.
-    fn noise(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-        }
-    }
+    use hidden_effects::draw::Draw;
 
     /// A motion of size 1 along each axis seen by two sources, the first of a scale, with noise of
     /// a size on each.
     fn seen(scale: f64, own_noise: f64, other_noise: f64) -> Pairs {
-        let mut next = noise(7);
+        let mut draw = Draw::new(7);
         let mut pairs = Pairs::default();
         for _ in 0..2000 {
-            let mut vector = |size: f64| Vector3::new(next(), next(), next()) * size;
+            let mut vector = |size: f64| Vector3::from(draw.normal3(size));
             let truth = vector(1.0);
             pairs.push(truth * scale + vector(own_noise * scale), truth + vector(other_noise));
         }

@@ -247,6 +247,7 @@ fn autoregression(series: &[Vec<f64>], doubt: &[Vec<f64>]) -> Option<Filter> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hidden_effects::draw::Draw;
 
     /// A segment of one channel with `n` rows.
     fn segment(n: usize) -> Segment {
@@ -262,14 +263,8 @@ mod tests {
     }
     /// Noise of unit size without memory, the same on every run.
     fn noise(n: usize) -> Vec<f64> {
-        let mut state = 1_u64;
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
-        (0..n).map(|_| (0..12).map(|_| uniform()).sum()).collect()
+        let mut draw = Draw::new(1);
+        (0..n).map(|_| draw.normal(1.0)).collect()
     }
     fn mean_square(x: &[f64]) -> f64 {
         x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64

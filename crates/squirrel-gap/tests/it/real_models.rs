@@ -4,6 +4,7 @@
 
 use crate::support::{fly, fly_rich, vehicle_with};
 use hidden_effects::case::{Case, Set};
+use hidden_effects::draw::Draw;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_gap::{Diagnosis, Kind, add, diagnose};
 use squirrel_log::FlightLog;
@@ -53,16 +54,12 @@ fn a_name_stands_beside_what_a_model_misses_everywhere() {
 fn vibration_in_a_calm_flight_does_not_hide_a_moment() {
     let off = "[effects.cg_offset]\ncg_x_m = 0.006\ncg_y_m = -0.005\n\n[limits]";
     let flown = vehicle_with("squirrel.toml", &[("[limits]", off)]);
-    let mut state = 5_u64;
-    let mut noise = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    };
+    let mut draw = Draw::new(5);
     let flights = [1, 2].map(|seed| {
         let (name, mut log) = fly("track", &flown, seed);
         let imu = log.sources.get_mut("imu").unwrap();
         let gyro = imu.channels.get_mut("omega_body_rad_s").unwrap();
-        gyro.values.iter_mut().for_each(|x| *x += 0.3 * noise());
+        gyro.values.iter_mut().for_each(|x| *x += draw.uniform(-0.3, 0.3));
         (name, log)
     });
     let verdict = diagnose(&VehicleFile::squirrel(), &flights, &[], &|_| {}).unwrap().verdict;
