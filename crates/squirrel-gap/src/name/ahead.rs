@@ -1,5 +1,5 @@
-//! Delays and lags of commands beside a controller that feeds its gyroscope back: each must help to foretell
-//! what the gyroscope reads next (`predictor/innovations.rs`), not only to explain what it
+//! Delays and lags of commands beside a controller that feeds its gyroscope back: each must help to
+//! foretell what the gyroscope reads next (`predictor/innovations.rs`), not only to explain what it
 //! has read.
 
 use super::Naming;
@@ -9,8 +9,8 @@ use crate::predictor::DYNAMIC;
 use squirrel_core::effects::{Response, Shown};
 
 impl Search<'_> {
-    /// The delay or lag of commands that foretells least, if that is too little to be told. Where moments take
-    /// no part, none was named from them.
+    /// The delay or lag of commands that foretells least, if that is too little to be told. Where
+    /// moments take no part, none was named from them.
     ///
     /// # Errors
     /// What the predictor says.
