@@ -70,17 +70,7 @@ fn run(arguments: &[String]) -> Result<String, String> {
             // Drawing needs no screen, and the repository stays as it is.
             .env("MPLBACKEND", "agg")
             .env("PYTHONDONTWRITEBYTECODE", "1")
-            .args([
-                "-m",
-                "pytest",
-                "-q",
-                "-p",
-                "no:cacheprovider",
-                "-n",
-                "2",
-                "--dist",
-                "worksteal",
-            ])
+            .args("-m pytest -q -p no:cacheprovider -n 2 --dist worksteal".split(' '))
             .args(arguments),
     )?;
     Ok(size)

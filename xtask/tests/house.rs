@@ -269,3 +269,24 @@ fn the_port_that_is_shown_is_the_port_that_is_compiled() {
     );
     assert!(shown.lines().count() <= 32, "{} lines", shown.lines().count());
 }
+
+/// Unit tests of a library that is compiled without them would never run, and nobody would know.
+#[test]
+fn a_library_without_unit_tests_has_none() {
+    let crates = root().join("crates");
+    let without: Vec<_> = folders(&crates)
+        .into_iter()
+        .filter(|name| {
+            let manifest = fs::read_to_string(crates.join(name).join("Cargo.toml")).unwrap();
+            let library = manifest.split("[lib]").nth(1).and_then(|rest| rest.split("\n[").next());
+            library.is_some_and(|library| library.contains("\ntest = false"))
+        })
+        .collect();
+    assert_eq!(without, ["squirrel-batch", "squirrel-py"]);
+    for name in without {
+        for file in files(&crates.join(name).join("src"), &["rs"]) {
+            let text = fs::read_to_string(&file).unwrap();
+            assert!(!text.contains("#[test]"), "{}: never runs", file.display());
+        }
+    }
+}

@@ -2,18 +2,18 @@
 //! effects where vehicles have them; each vehicle with numbers of its own.
 //!
 //! Sixteen vehicles lie side by side (`rows`), and the equations of `squirrel_core::dynamics` run
-//! on registers of them ([`squirrel_sim::simd`], `dynamics`), on as many threads as asked for (`pool`). All steps
-//! of a call are done block by block, so that a block stays in the processor for all of them. What
-//! a vehicle does depends on nothing but itself: the same bits in a batch of any size, at any place
-//! in it, on any registers, on any number of threads, in one call or in many, and the numbers of
-//! `squirrel_core::dynamics` in the same scalar.
+//! on registers of them ([`squirrel_sim::simd`], `dynamics`), on as many threads as asked for
+//! ([`pool`]). All steps of a call are done block by block, so that a block stays in the processor
+//! for all of them. What a vehicle does depends on nothing but itself: the same bits in a batch of
+//! any size, at any place in it, on any registers, on any number of threads, in one call or in
+//! many, and the numbers of `squirrel_core::dynamics` in the same scalar.
 //!
 //! [`Batch::new`] takes airframes and flies the base model. [`Batch::with`] takes whole vehicles
 //! ([`BatchVehicle`]): flat wings and membranes with their servos, batteries (`battery`), effects,
-//! gusts (`air`) and late commands (`extra`), with the equations of [`squirrel_sim::plant::Plant`], which
-//! `squirrel_core` has once for both. What no vehicle of the batch has is not computed. A wing that
-//! is a network, and effects that act on sensors or stamps (accel_bias, accel_scale, clock_skew,
-//! clock_step, compass_current, gnss_latency, gyro_scale, heading_bias), are refused.
+//! gusts (`air`) and late commands (`extra`), with the equations of [`squirrel_sim::plant::Plant`],
+//! which `squirrel_core` has once for both. What no vehicle of the batch has is not computed. A wing
+//! that is a network, and effects that act on sensors or stamps (accel_bias, accel_scale,
+//! clock_skew, clock_step, compass_current, gnss_latency, gyro_scale, heading_bias), are refused.
 //!
 //! - [`Batch`]: vehicles side by side, in one scalar, of up to so many rotors
 //! - [`BatchVehicle`]: one of them, with all that it may have

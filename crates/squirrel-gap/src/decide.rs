@@ -127,8 +127,8 @@ pub(crate) fn decide(
     let share = left_share(naming);
     // What explains some flights and makes others worse is no name for what the vehicle lacks.
     let fails = gap.as_ref().is_some_and(|gap| gap.after > (1.0 + HELD_OUT_NOISE) * gap.before);
-    let hardly = close.is_empty() && !effects.is_empty() && gap.as_ref().is_some_and(stays);
-    let fails_alone = fails || hardly;
+    let is_named_alone = close.is_empty() && !effects.is_empty();
+    let is_refuted = fails || is_named_alone && gap.as_ref().is_some_and(stays);
     let kind = if effects.is_empty() {
         match (leftover.is_real(), blind.is_empty()) {
             (true, _) => Kind::OutsideCatalogue,
@@ -154,7 +154,7 @@ pub(crate) fn decide(
         }
     } else if close.len() > ALTERNATIVES_MAX {
         Kind::NotIdentifiable
-    } else if close.is_empty() && fails_alone {
+    } else if close.is_empty() && is_refuted {
         Kind::OutsideCatalogue
     } else if close.is_empty() {
         Kind::Named
@@ -188,7 +188,7 @@ pub(crate) fn decide(
     let goes_with = if leftover.is_real() {
         Some(leftover.goes_with().unwrap_or_else(|| leftover.channels()))
     } else {
-        fails_alone.then(|| "the flight, since the held-out ones lack something else".to_owned())
+        is_refuted.then(|| "the flight, since the held-out ones lack something else".to_owned())
     };
     let goes_with = goes_with.filter(|_| kind != Kind::Named);
     let fly_next = match kind {
