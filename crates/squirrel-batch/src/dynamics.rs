@@ -10,9 +10,9 @@ use squirrel_core::aero::flat_plate;
 use squirrel_core::aero::membrane::{Membrane, Side};
 use squirrel_core::dynamics::battery::Charge;
 use squirrel_core::dynamics::lanes::{Airframe, Held, Motion, derivative, plus_scaled, settle};
+use squirrel_core::dynamics::runge_kutta;
 use squirrel_core::dynamics::servo::{Servo, ServoState};
 use squirrel_core::dynamics::whole::{self, FLAT, MEMBRANE, NONE, Whole, lateral};
-use squirrel_core::dynamics::{Stages, runge_kutta};
 use squirrel_core::effects::{PendulumState, Prepared, Swing};
 use squirrel_core::lane::vector::{minus, rotation, unit};
 use squirrel_core::lane::{Row, load, store};
@@ -32,17 +32,6 @@ pub(super) struct Advance<'a, S: Copy, const ROTORS: usize> {
 /// function with all variants has a frame that overflows the stack where the compiler does not
 /// optimise.
 pub(super) struct AdvanceWhole<'a, S: Copy, const ROTORS: usize>(pub(super) Advance<'a, S, ROTORS>);
-
-#[inline(always)]
-fn splat<L: Register, const STAGES: usize>(
-    stages: Stages<L::Element, STAGES>,
-) -> Stages<L, STAGES> {
-    let mut registers = [[L::of(0.0); 2]; STAGES];
-    for k in 0..STAGES {
-        registers[k] = [L::splat(stages[k][0]), L::splat(stages[k][1])];
-    }
-    registers
-}
 
 impl<S: Paths, const ROTORS: usize> Kernel<S> for Advance<'_, S, ROTORS> {
     type Output = ();
@@ -67,18 +56,13 @@ impl<S: Paths, const ROTORS: usize> Kernel<S> for AdvanceWhole<'_, S, ROTORS> {
 
     #[inline(always)]
     fn run<L: Register<Element = S>>(self) {
-        let dt = self.0.dt_s;
-        match self.0.scheme {
-            Scheme::Euler => self.with::<L, 1>([[real(0.0), dt]]),
-            Scheme::Rk4 => self.with::<L, 4>(runge_kutta(dt)),
-        }
-    }
-}
-
-impl<S: Paths, const ROTORS: usize> AdvanceWhole<'_, S, ROTORS> {
-    #[inline(always)]
-    fn with<L: Register<Element = S>, const STAGES: usize>(self, stages: [[S; 2]; STAGES]) {
-        let Advance { blocks, dt_s: dt, steps, .. } = self.0;
+        let Advance { blocks, scheme, dt_s, steps } = self.0;
+        let dt = L::splat(dt_s);
+        let (euler, rk4) = ([[L::of(0.0), dt]], runge_kutta(dt));
+        let stages: &[[L; 2]] = match scheme {
+            Scheme::Euler => &euler,
+            Scheme::Rk4 => &rk4,
+        };
         let mut forecast = Forecast::empty();
         for block in blocks {
             let Some(kind) =
@@ -93,20 +77,16 @@ impl<S: Paths, const ROTORS: usize> AdvanceWhole<'_, S, ROTORS> {
                 left -= steps;
                 match kind {
                     (NONE, _) => {
-                        fitted::<L, ROTORS, STAGES, NONE, true>(block, steps, winds, stages, dt);
+                        fitted::<L, ROTORS, NONE, true>(block, steps, winds, stages, dt);
                     }
                     (FLAT, _) => {
-                        fitted::<L, ROTORS, STAGES, FLAT, true>(block, steps, winds, stages, dt);
+                        fitted::<L, ROTORS, FLAT, true>(block, steps, winds, stages, dt);
                     }
                     (_, false) => {
-                        fitted::<L, ROTORS, STAGES, MEMBRANE, false>(
-                            block, steps, winds, stages, dt,
-                        );
+                        fitted::<L, ROTORS, MEMBRANE, false>(block, steps, winds, stages, dt);
                     }
                     (_, true) => {
-                        fitted::<L, ROTORS, STAGES, MEMBRANE, true>(
-                            block, steps, winds, stages, dt,
-                        );
+                        fitted::<L, ROTORS, MEMBRANE, true>(block, steps, winds, stages, dt);
                     }
                 }
             }
@@ -150,24 +130,16 @@ fn plain<L: Register, const ROTORS: usize, const STAGES: usize>(
 ///
 /// * `winds` - that come, see `Forecast`
 #[inline(always)]
-fn fitted<
-    L: Register,
-    const ROTORS: usize,
-    const STAGES: usize,
-    const WING: u8,
-    const EFFECTS: bool,
->(
+fn fitted<L: Register, const ROTORS: usize, const WING: u8, const EFFECTS: bool>(
     block: &mut Block<L::Element, ROTORS>,
     steps: u64,
     winds: &[(u64, [Row<L::Element>; 3])],
-    stages: [[L::Element; 2]; STAGES],
-    dt_s: L::Element,
+    stages: &[[L; 2]],
+    dt: L,
 ) {
     let starts = block.starts::<L>();
     let Some(extra) = &mut block.extra else { return };
-    let (lagless, dt) = (block.lagless, L::splat(dt_s));
-    let per_step = L::splat(real::<L::Element>(1.0) / dt_s);
-    let stages = splat(stages);
+    let (lagless, per_step) = (block.lagless, L::of(1.0) / dt);
     for start in starts {
         let held = Held::<L, ROTORS>::load(&block.held, start);
         let asked = held.target_speed;
@@ -226,7 +198,7 @@ fn fitted<
                 }
             }
             let (next, moved) =
-                whole::step::<L, ROTORS, STAGES, WING, EFFECTS>(&vehicle, &stages, &state, &sides);
+                whole::step::<L, ROTORS, WING, EFFECTS>(&vehicle, stages, &state, &sides);
             sides = moved;
             if let (Some(packs), Some(charge)) = (&extra.packs, &mut charge) {
                 packs.step(charge, start, &state.rotor_speed, dt);

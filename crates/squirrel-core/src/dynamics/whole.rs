@@ -6,7 +6,7 @@
 
 use super::lanes::{Airframe, Held, Motion, airflow, body_rate, plus_scaled, rotor_rates, rotors};
 use super::rotors::spin;
-use super::{Stages, Surroundings, with_effects};
+use super::{Surroundings, with_effects};
 use crate::aero::membrane::{Membrane, Side};
 use crate::aero::{Airflow, BodyWrench, drag, flat_plate};
 use crate::effects::{PendulumState, Prepared, Present, Swing};
@@ -51,25 +51,22 @@ pub struct Whole<L: Lane, const ROTORS: usize> {
 
 /// One step: the motion and the membranes at its end. Servos, battery, load and air are stepped
 /// beside it.
+///
+/// * `stages` - one of Euler's, or four of [`runge_kutta`](super::runge_kutta); their number is no
+///   constant, so that the derivative is compiled once for both
 #[inline(always)]
-pub fn step<
-    L: Lane,
-    const ROTORS: usize,
-    const STAGES: usize,
-    const WING: u8,
-    const EFFECTS: bool,
->(
+pub fn step<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>(
     whole: &Whole<L, ROTORS>,
-    stages: &Stages<L, STAGES>,
+    stages: &[[L; 2]],
     state: &Motion<L, ROTORS>,
     sides: &[Side<L>; 2],
 ) -> (Motion<L, ROTORS>, [Side<L>; 2]) {
     let (mut stage, mut next, mut sides_stage, mut sides_next) = (*state, *state, *sides, *sides);
-    for k in 0..STAGES {
+    for k in 0..stages.len() {
         let (rate, sides_rate) =
             derivative::<L, ROTORS, WING, EFFECTS>(whole, &stage, &sides_stage);
         let [ahead, weight] = stages[k];
-        if k + 1 < STAGES {
+        if k + 1 < stages.len() {
             stage = plus_scaled(state, ahead, &rate);
             if WING == MEMBRANE {
                 sides_stage = moved(sides, ahead, &sides_rate);

@@ -107,12 +107,12 @@ impl Plant {
         let stages = runge_kutta(constant(self.dt_s()));
         let (after, _) = match self.wing {
             WingPlant::None => {
-                whole::step::<_, ROTORS, 4, NONE, true>(&vehicle, &stages, &before, &sides)
+                whole::step::<_, ROTORS, NONE, true>(&vehicle, &stages, &before, &sides)
             }
             WingPlant::Flat { .. } => {
-                whole::step::<_, ROTORS, 4, FLAT, true>(&vehicle, &stages, &before, &sides)
+                whole::step::<_, ROTORS, FLAT, true>(&vehicle, &stages, &before, &sides)
             }
-            _ => whole::step::<_, ROTORS, 4, MEMBRANE, true>(&vehicle, &stages, &before, &sides),
+            _ => whole::step::<_, ROTORS, MEMBRANE, true>(&vehicle, &stages, &before, &sides),
         };
         Some(rows(&after))
     }
