@@ -12,7 +12,7 @@ use squirrel_core::aero::membrane::{Membrane, Side};
 use squirrel_core::dynamics::lanes::{Airframe, Held, Motion};
 use squirrel_core::dynamics::rotors::spin_signs;
 use squirrel_core::dynamics::runge_kutta;
-use squirrel_core::dynamics::whole::{self, FLAT, MEMBRANE, NONE, Whole, lateral};
+use squirrel_core::dynamics::whole::{self, FLAT, MEMBRANE, Whole, lateral};
 use squirrel_core::effects::{PendulumState, Swing};
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::lane::vector::rotation;
@@ -105,14 +105,11 @@ impl Plant {
             }
         }
         let stages = runge_kutta(constant(self.dt_s()));
-        let (after, _) = match self.wing {
-            WingPlant::None => {
-                whole::step::<_, ROTORS, NONE, true>(&vehicle, &stages, &before, &sides)
-            }
-            WingPlant::Flat { .. } => {
-                whole::step::<_, ROTORS, FLAT, true>(&vehicle, &stages, &before, &sides)
-            }
-            _ => whole::step::<_, ROTORS, MEMBRANE, true>(&vehicle, &stages, &before, &sides),
+        // No wing is one without area: a step of its own would only be compiled once more.
+        let (after, _) = if membrane.is_some() {
+            whole::step::<_, ROTORS, MEMBRANE, true>(&vehicle, &stages, &before, &sides)
+        } else {
+            whole::step::<_, ROTORS, FLAT, true>(&vehicle, &stages, &before, &sides)
         };
         Some(rows(&after))
     }
