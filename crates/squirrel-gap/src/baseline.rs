@@ -11,7 +11,7 @@
 //! flights tell of scatter.
 
 use crate::GapError;
-use crate::compatibility::{self, Moments, Ready};
+use crate::compatibility::{self, Fit, Moments, Ready};
 use crate::fitted;
 use crate::leftover::usual;
 use crate::name::{BETA, Catalogue, Scatter, Scored, Search, hypothesis};
@@ -77,7 +77,7 @@ impl Baseline {
         let (set_aside, moments) = match Ready::new(vehicle, flights, &[]) {
             Ok(ready) => {
                 let is_known = ready.predictor.has_gyroscope()
-                    && compatibility::moments_fit(&ready.predictor, &ready.nominal);
+                    && compatibility::moments_fit(&ready.predictor, &ready.nominal) == Fit::Whole;
                 let moments = if is_known { Moments::IfKnown } else { Moments::Lasting };
                 (compatibility::problems(&ready, flights, &[])?, moments)
             }

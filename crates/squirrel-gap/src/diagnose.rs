@@ -3,7 +3,7 @@
 
 use crate::GapError;
 use crate::baseline::Baseline;
-use crate::compatibility::{self, Moments, Ready};
+use crate::compatibility::{self, Fit, Moments, Ready};
 use crate::decide::{alternatives, close, decide, shared};
 use crate::diagnosis::{Covered, Details, Diagnosis, Own};
 use crate::find;
@@ -15,7 +15,7 @@ use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
 use crate::proof::{gap, hold, prove};
 use crate::verdict::{Kind, SetAside, Verdict, nothing_to_add};
-use squirrel_core::effects::{BatterySag, Effect};
+use squirrel_core::effects::{BatterySag, Effect, Effects, Shown};
 use squirrel_core::vehicle::{ThrustCurve, Vehicle};
 use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -136,10 +136,32 @@ fn sorted<'a>(
         // What a machine's own numbers make of quick moments says nothing of its data.
         Some(own) => {
             let ready = Ready::new(&own.vehicle, flights, held_out)?;
-            judged(&own.vehicle, baseline, flights, held_out, ready, progress)
+            judged(&own.vehicle, baseline, flights, held_out, ready, own.moments, progress)
         }
-        None => judged(vehicle, None, flights, held_out, ready, progress),
+        None => {
+            let fit = compatibility::moments_fit(&ready.predictor, &ready.nominal);
+            if fit == Fit::Quick && ready.predictor.has_gyroscope() {
+                // What the file lacks of the moments is slow. They count where what lasts explains
+                // all of it; else they would be read into whatever name takes most of it, or noise
+                // of the gyroscope into a lag.
+                let again = Ready::new(vehicle, flights, held_out)?;
+                let whole =
+                    judged(vehicle, None, flights, held_out, again, Moments::All, progress)?;
+                if lasts(&whole.verdict) {
+                    return Ok(whole);
+                }
+            }
+            judged(vehicle, None, flights, held_out, ready, Moments::IfKnown, progress)
+        }
     }
+}
+
+/// Whether effects that last explain all that is above noise.
+fn lasts(verdict: &Verdict) -> bool {
+    let does = |name: &str| {
+        Effects::<f64>::profile(name).is_some_and(|profile| profile.shown.has(Shown::LASTING))
+    };
+    verdict.verdict == Kind::Named && verdict.effects.iter().all(|effect| does(effect.name))
 }
 
 /// The diagnosis of flights that agree with themselves.
@@ -149,11 +171,11 @@ fn judged(
     flights: &[(String, FlightLog)],
     held_out: &[(String, FlightLog)],
     ready: Ready<'_>,
+    moments: Moments,
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis, GapError> {
     let domain = covered(&ready.predictor);
     let places = find::places(&ready.predictor, &ready.nominal)?;
-    let moments = baseline.map_or(Moments::IfKnown, |baseline| baseline.moments);
     let Ready { mut predictor, nominal, mut unseen } = ready.narrowed(flights, moments)?;
     let has_other_moments = predictor.has_motion() && !predictor.has_channel(3);
     if let Some(unseen) = &mut unseen {

@@ -201,6 +201,8 @@ const QUICK_FIT: f64 = 0.93;
 /// correlation is low and the slope is 0.97 to 1.05; of brushed motors whose moments the file does
 /// not know it is 0.1 to 0.2.
 const WHOLE: [f64; 2] = [0.7, 1.4];
+/// The same of their changes, which a lag that is off by a little makes larger or smaller.
+const CHANGES: [f64; 2] = [0.5, 2.0];
 const TELLS: f64 = 0.25;
 
 /// What takes part of the moments of some flights.
@@ -208,6 +210,8 @@ const TELLS: f64 = 0.25;
 pub(crate) enum Moments {
     /// All of them, where they have to do with those of the vehicle file.
     IfKnown,
+    /// All of them.
+    All,
     /// What lasts of them: the vehicle's numbers are those of this machine.
     Lasting,
 }
@@ -223,34 +227,60 @@ pub(crate) fn leave_out(predictor: &mut Predictor<'_>, residual: &[f64], moments
         predictor.leave_out_moments();
     } else if moments == Moments::Lasting {
         predictor.keep_trim();
-    } else if !predictor.has_pitch() || !moments_fit(predictor, residual) {
+    } else if !predictor.has_pitch()
+        || (moments == Moments::IfKnown && moments_fit(predictor, residual) != Fit::Whole)
+    {
         // What turned a vehicle is not known where its pitch is what its force would have it be.
         predictor.leave_out_moments();
     }
+}
+
+/// How much the vehicle file's moments have to do with the measured ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Fit {
+    /// They predict them.
+    Whole,
+    /// They predict what changes from one row to the next: beside a large moment that the file
+    /// lacks, seen through a noisy gyroscope, or of rotors that the file knows little of.
+    Quick,
+    /// They do not.
+    Not,
 }
 
 /// Whether the vehicle file's moments have to do with the measured ones; where they do not, nothing
 /// is named from them. A large moment that the file lacks is slow, as velocity is, and what is
 /// quick still follows the commands. What a gyroscope adds does not change how much of a moment is
 /// in the measured one.
-pub(crate) fn moments_fit(predictor: &Predictor<'_>, residual: &[f64]) -> bool {
-    let (mut fits, mut roll_and_pitch) = (Vec::new(), Products::default());
+pub(crate) fn moments_fit(predictor: &Predictor<'_>, residual: &[f64]) -> Fit {
+    let mut fits = Vec::new();
+    let (mut roll_and_pitch, mut quick) = (Products::default(), Products::default());
     for piece in 0..predictor.tracks.len() {
         if predictor.tracks[piece].measured.len() <= 100 {
             continue;
         }
         let flight = Flight::piece(predictor, piece);
         let moments: Pairs = flight.predicted(residual, 3);
-        let undamped = moments.with_damping(&flight.omega());
+        let (undamped, changes) = (moments.with_damping(&flight.omega()), moments.changes());
         let fit = |pairs: &Pairs| pairs.best_shift(flight.step_s(), 0.2);
-        let (shift_s, own) = fit(&moments);
-        fits.push([own.max(fit(&undamped).1), fit(&moments.changes()).1]);
-        roll_and_pitch += moments.products((shift_s / flight.step_s()).round() as i64);
+        let rows = |shift_s: f64| (shift_s / flight.step_s()).round() as i64;
+        let ((shift_s, own), (shift_of_changes_s, of_changes)) = (fit(&moments), fit(&changes));
+        fits.push([own.max(fit(&undamped).1), of_changes]);
+        roll_and_pitch += moments.products(rows(shift_s));
+        quick += changes.products(rows(shift_of_changes_s));
     }
     let mean = |of: usize| fits.iter().map(|fit| fit[of]).sum::<f64>() / fits.len() as f64;
-    fits.is_empty()
+    let tells = |products: Products, [low, high]: [f64; 2]| {
+        products.correlation() >= TELLS && (low..=high).contains(&products.slope())
+    };
+    if fits.is_empty()
         || mean(0) >= MOMENT_FIT
         || mean(1) >= QUICK_FIT
-        || (roll_and_pitch.correlation() >= TELLS
-            && (WHOLE[0]..=WHOLE[1]).contains(&roll_and_pitch.slope()))
+        || tells(roll_and_pitch, WHOLE)
+    {
+        Fit::Whole
+    } else if tells(quick, CHANGES) {
+        Fit::Quick
+    } else {
+        Fit::Not
+    }
 }

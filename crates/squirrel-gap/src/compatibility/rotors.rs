@@ -103,19 +103,24 @@ pub(super) fn model(flight: &Flight, residual: &[f64]) -> Found {
 /// Another order of rotors that explains the angular acceleration much better.
 fn order(flight: &Flight) -> Found {
     let count = flight.vehicle().parameters().rotor_count;
-    let sums = Sums::new(flight)?;
+    let [sums, changes] = [Sums::new(flight, false)?, Sums::new(flight, true)?];
     let most = (SHIFT_S.1 / flight.step_s()) as usize;
     let levers = levers(flight);
-    let score = |order: &[usize]| -> f64 {
+    let score = |sums: &Sums, order: &[usize]| -> f64 {
         (0..=most).map(|late| sums.score(late, &levers, order)).fold(f64::NEG_INFINITY, f64::max)
     };
     let as_given: Vec<usize> = (0..count).collect();
-    let own = score(&as_given);
+    let is_wrong = |sums: &Sums, best: f64| {
+        let own = score(sums, &as_given);
+        best - own >= ORDER_SD * sums.chance && own <= ORDER_SHARE * best
+    };
     let (best, order) = orders(count)
         .into_iter()
-        .map(|order| (score(&order), order))
+        .map(|order| (score(&sums, &order), order))
         .max_by(|a, b| a.0.total_cmp(&b.0))?;
-    if best - own < ORDER_SD * sums.chance || own > ORDER_SHARE * best {
+    // Beside a weak rotor, what the others give for it swings with the thrust, and an order that
+    // turns that into yaw fits better. What is quick tells, too.
+    if !is_wrong(&sums, best) || !is_wrong(&changes, score(&changes, &order)) {
         return None;
     }
     // Slot `order[j]` of the log is rotor `j` of the vehicle; a map says which rotor each slot is.
@@ -193,7 +198,8 @@ struct Sums {
 const LAGS: usize = 8;
 
 impl Sums {
-    fn new(flight: &Flight) -> Option<Self> {
+    /// * `changes` - of what changes from row to row instead
+    fn new(flight: &Flight, changes: bool) -> Option<Self> {
         let count = flight.vehicle().parameters().rotor_count;
         let mut sums = Self {
             cross: vec![[[0.0; MAX_ROTORS]; 3]; LAGS + 1],
@@ -203,9 +209,14 @@ impl Sums {
         };
         let (mut rows, mut memory) = (0.0, 0.0);
         for track in flight.tracks() {
-            let thrust = thrusts(flight, track);
-            let measured: Vec<Vector3<f64>> =
+            let mut thrust = thrusts(flight, track);
+            let mut measured: Vec<Vector3<f64>> =
                 track.measured.iter().map(|m| Vector3::new(m[3], m[4], m[5])).collect();
+            if changes {
+                measured = measured.windows(2).map(|w| w[1] - w[0]).collect();
+                let change = |w: &[[f64; MAX_ROTORS]]| std::array::from_fn(|i| w[1][i] - w[0][i]);
+                thrust = thrust.windows(2).map(change).collect();
+            }
             let n = measured.len().min(thrust.len());
             if n <= 2 * LAGS {
                 continue;
