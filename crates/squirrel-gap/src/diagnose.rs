@@ -132,28 +132,23 @@ fn sorted<'a>(
     if !aside.is_empty() {
         return without(aside);
     }
-    match baseline {
+    if let Some(own) = baseline {
         // What a machine's own numbers make of quick moments says nothing of its data.
-        Some(own) => {
-            let ready = Ready::new(&own.vehicle, flights, held_out)?;
-            judged(&own.vehicle, baseline, flights, held_out, ready, own.moments, progress)
-        }
-        None => {
-            let fit = compatibility::moments_fit(&ready.predictor, &ready.nominal);
-            if fit == Fit::Quick && ready.predictor.has_gyroscope() {
-                // What the file lacks of the moments is slow. They count where what lasts explains
-                // all of it; else they would be read into whatever name takes most of it, or noise
-                // of the gyroscope into a lag.
-                let again = Ready::new(vehicle, flights, held_out)?;
-                let whole =
-                    judged(vehicle, None, flights, held_out, again, Moments::All, progress)?;
-                if lasts(&whole.verdict) {
-                    return Ok(whole);
-                }
-            }
-            judged(vehicle, None, flights, held_out, ready, Moments::IfKnown, progress)
+        let ready = Ready::new(&own.vehicle, flights, held_out)?;
+        return judged(&own.vehicle, baseline, flights, held_out, ready, own.moments, progress);
+    }
+    let fit = compatibility::moments_fit(&ready.predictor, &ready.nominal);
+    if fit == Fit::Quick && ready.predictor.has_gyroscope() {
+        // What the file lacks of the moments is slow. They count where what lasts explains all of
+        // it; else they would be read into whatever name takes most of it, or noise of the
+        // gyroscope into a lag.
+        let again = Ready::new(vehicle, flights, held_out)?;
+        let whole = judged(vehicle, None, flights, held_out, again, Moments::All, progress)?;
+        if lasts(&whole.verdict) {
+            return Ok(whole);
         }
     }
+    judged(vehicle, None, flights, held_out, ready, Moments::IfKnown, progress)
 }
 
 /// Whether effects that last explain all that is above noise.
