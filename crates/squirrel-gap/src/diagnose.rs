@@ -137,14 +137,15 @@ fn sorted<'a>(
         let ready = Ready::new(&own.vehicle, flights, held_out)?;
         return judged(&own.vehicle, baseline, flights, held_out, ready, own.moments, progress);
     }
-    let fit = compatibility::moments_fit(&ready.predictor, &ready.nominal);
-    if fit == Fit::Quick && ready.predictor.has_gyroscope() {
+    if ready.predictor.has_gyroscope()
+        && compatibility::moments_fit(&ready.predictor, &ready.nominal) == Fit::Quick
+    {
         // What the file lacks of the moments is slow. They count where what lasts explains all of
         // it; else they would be read into whatever name takes most of it, or noise of the
         // gyroscope into a lag.
         let again = Ready::new(vehicle, flights, held_out)?;
         let whole = judged(vehicle, None, flights, held_out, again, Moments::All, progress)?;
-        if lasts(&whole.verdict) {
+        if what_lasts_is_all(&whole.verdict) {
             return Ok(whole);
         }
     }
@@ -152,7 +153,7 @@ fn sorted<'a>(
 }
 
 /// Whether effects that last explain all that is above noise.
-fn lasts(verdict: &Verdict) -> bool {
+fn what_lasts_is_all(verdict: &Verdict) -> bool {
     let does = |name: &str| {
         Effects::<f64>::profile(name).is_some_and(|profile| profile.shown.has(Shown::LASTING))
     };

@@ -201,9 +201,9 @@ const QUICK_FIT: f64 = 0.93;
 /// correlation is low and the slope is 0.97 to 1.05; of brushed motors whose moments the file does
 /// not know it is 0.1 to 0.2.
 const WHOLE: [f64; 2] = [0.7, 1.4];
-/// The same of their changes, which a lag that is off by a little makes larger or smaller.
-const CHANGES: [f64; 2] = [0.5, 2.0];
 const TELLS: f64 = 0.25;
+/// The first of their changes, which a lag that is off by a little makes larger or smaller.
+const CHANGES: [f64; 2] = [0.5, 2.0];
 
 /// What takes part of the moments of some flights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

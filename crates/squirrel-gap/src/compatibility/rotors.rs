@@ -103,7 +103,7 @@ pub(super) fn model(flight: &Flight, residual: &[f64]) -> Found {
 /// Another order of rotors that explains the angular acceleration much better.
 fn order(flight: &Flight) -> Found {
     let count = flight.vehicle().parameters().rotor_count;
-    let [sums, changes] = [Sums::new(flight, false)?, Sums::new(flight, true)?];
+    let sums = Sums::new(flight, false)?;
     let most = (SHIFT_S.1 / flight.step_s()) as usize;
     let levers = levers(flight);
     let score = |sums: &Sums, order: &[usize]| -> f64 {
@@ -118,9 +118,13 @@ fn order(flight: &Flight) -> Found {
         .into_iter()
         .map(|order| (score(&sums, &order), order))
         .max_by(|a, b| a.0.total_cmp(&b.0))?;
+    if !is_wrong(&sums, best) {
+        return None;
+    }
     // Beside a weak rotor, what the others give for it swings with the thrust, and an order that
     // turns that into yaw fits better. What is quick tells, too.
-    if !is_wrong(&sums, best) || !is_wrong(&changes, score(&changes, &order)) {
+    let changes = Sums::new(flight, true)?;
+    if !is_wrong(&changes, score(&changes, &order)) {
         return None;
     }
     // Slot `order[j]` of the log is rotor `j` of the vehicle; a map says which rotor each slot is.

@@ -109,15 +109,20 @@ fn a_lag_is_named_where_noise_is_fed_back() {
     assert_eq!((verdict.verdict, names), (Kind::Named, vec!["motor_lag"]), "{}", verdict.words);
 }
 
+/// The vehicle with a rotor that gives less.
+fn with_weak_rotor(loss: f64) -> VehicleFile {
+    let weak =
+        format!("[effects.weak_rotor]\nrotor = 4\nthrust_loss_fraction = {loss}\n\n[limits]");
+    vehicle_with(FILE, &[("[limits]", &weak)])
+}
+
 /// What a rotor gives less swings with the thrust, slowly and by far more than a calm flight turns;
 /// what is quick is the gyroscope's noise. The file's moments go with the measured ones in neither,
 /// but from row to row they are as large.
 #[test]
 fn a_weak_rotor_is_named_from_a_calm_flight_through_a_noisy_gyroscope() {
-    let weak =
-        ("[limits]", "[effects.weak_rotor]\nrotor = 4\nthrust_loss_fraction = 0.12\n\n[limits]");
-    let verdict =
-        verdict(&vehicle_with(FILE, &[weak]), Flown { gyro_rad_s: 0.003, heave: 0.3, hold: 0.2 });
+    let how = Flown { gyro_rad_s: 0.003, heave: 0.3, hold: 0.2 };
+    let verdict = verdict(&with_weak_rotor(0.12), how);
     let names: Vec<_> = verdict.effects.iter().map(|effect| effect.name).collect();
     assert_eq!((verdict.verdict, names), (Kind::Named, vec!["weak_rotor"]), "{}", verdict.words);
 }
@@ -125,9 +130,7 @@ fn a_weak_rotor_is_named_from_a_calm_flight_through_a_noisy_gyroscope() {
 /// In another order of the rotors that swing would be yaw, which nothing measures as well.
 #[test]
 fn a_weak_rotor_is_no_wrong_order() {
-    let weak =
-        ("[limits]", "[effects.weak_rotor]\nrotor = 4\nthrust_loss_fraction = 0.06\n\n[limits]");
     let how = Flown { gyro_rad_s: 0.001, heave: 0.3, hold: 0.1 };
-    let verdict = verdict(&vehicle_with(FILE, &[weak]), how);
+    let verdict = verdict(&with_weak_rotor(0.06), how);
     assert!(verdict.set_aside.is_empty(), "{}", verdict.words);
 }

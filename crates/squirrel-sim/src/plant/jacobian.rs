@@ -105,7 +105,7 @@ impl Plant {
             }
         }
         let stages = runge_kutta(constant(self.dt_s()));
-        // No wing is one without area: a step of its own would only be compiled once more.
+        // No wing is one that never opens: a step of its own would only be compiled once more.
         let (after, _) = if membrane.is_some() {
             whole::step::<_, ROTORS, MEMBRANE, true>(&vehicle, &stages, &before, &sides)
         } else {
