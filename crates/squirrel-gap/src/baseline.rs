@@ -76,8 +76,7 @@ impl Baseline {
         progress("reading the baseline");
         let (set_aside, moments) = match Ready::new(vehicle, flights, &[]) {
             Ok(ready) => {
-                let is_known = ready.predictor.has_gyroscope()
-                    && compatibility::moments_fit(&ready.predictor, &ready.nominal) == Fit::Whole;
+                let is_known = ready.moments_fit() == Fit::Whole;
                 let moments = if is_known { Moments::IfKnown } else { Moments::Lasting };
                 (compatibility::problems(&ready, flights, &[])?, moments)
             }

@@ -137,9 +137,7 @@ fn sorted<'a>(
         let ready = Ready::new(&own.vehicle, flights, held_out)?;
         return judged(&own.vehicle, baseline, flights, held_out, ready, own.moments, progress);
     }
-    if ready.predictor.has_gyroscope()
-        && compatibility::moments_fit(&ready.predictor, &ready.nominal) == Fit::Quick
-    {
+    if ready.moments_fit() == Fit::Quick {
         // What the file lacks of the moments is slow. They count where what lasts explains all of
         // it; else they would be read into whatever name takes most of it, or noise of the
         // gyroscope into a lag.
@@ -154,10 +152,12 @@ fn sorted<'a>(
 
 /// Whether effects that last explain all that is above noise.
 fn what_lasts_is_all(verdict: &Verdict) -> bool {
-    let does = |name: &str| {
-        Effects::<f64>::profile(name).is_some_and(|profile| profile.shown.has(Shown::LASTING))
-    };
-    verdict.verdict == Kind::Named && verdict.effects.iter().all(|effect| does(effect.name))
+    verdict.verdict == Kind::Named && verdict.effects.iter().all(|effect| lasts(effect.name))
+}
+
+/// Whether an effect shows in what lasts of the dynamics.
+pub(crate) fn lasts(name: &str) -> bool {
+    Effects::<f64>::profile(name).is_some_and(|profile| profile.shown.has(Shown::LASTING))
 }
 
 /// The diagnosis of flights that agree with themselves.

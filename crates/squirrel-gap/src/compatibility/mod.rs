@@ -71,6 +71,15 @@ impl<'a> Ready<'a> {
         leave_out(&mut self.predictor, &self.nominal, moments);
         Ok(self)
     }
+
+    /// How much the file's moments have to do with those of a gyroscope; without one, nothing.
+    pub(crate) fn moments_fit(&self) -> Fit {
+        if self.predictor.has_gyroscope() {
+            moments_fit(&self.predictor, &self.nominal)
+        } else {
+            Fit::Not
+        }
+    }
 }
 
 /// Flights whose data contradict themselves or repeat another flight, in order.
@@ -251,7 +260,7 @@ pub(crate) enum Fit {
 /// is named from them. A large moment that the file lacks is slow, as velocity is, and what is
 /// quick still follows the commands. What a gyroscope adds does not change how much of a moment is
 /// in the measured one.
-pub(crate) fn moments_fit(predictor: &Predictor<'_>, residual: &[f64]) -> Fit {
+fn moments_fit(predictor: &Predictor<'_>, residual: &[f64]) -> Fit {
     let mut fits = Vec::new();
     let (mut roll_and_pitch, mut quick) = (Products::default(), Products::default());
     for piece in 0..predictor.tracks.len() {
