@@ -11,7 +11,7 @@
 //! flights tell of scatter.
 
 use crate::GapError;
-use crate::compatibility::{self, Fit, Moments, Ready};
+use crate::compatibility::{self, Gyroscope, Moments, Ready};
 use crate::fitted;
 use crate::leftover::usual;
 use crate::name::{BETA, Catalogue, Scatter, Scored, Search, hypothesis};
@@ -76,7 +76,7 @@ impl Baseline {
         progress("reading the baseline");
         let (set_aside, moments) = match Ready::new(vehicle, flights, &[]) {
             Ok(ready) => {
-                let is_known = ready.moments_fit() == Fit::Whole;
+                let is_known = ready.gyroscope() == Gyroscope::Follows;
                 let moments = if is_known { Moments::IfKnown } else { Moments::Lasting };
                 (compatibility::problems(&ready, flights, &[])?, moments)
             }

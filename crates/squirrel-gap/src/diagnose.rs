@@ -3,7 +3,7 @@
 
 use crate::GapError;
 use crate::baseline::Baseline;
-use crate::compatibility::{self, Fit, Moments, Ready};
+use crate::compatibility::{self, Gyroscope, Moments, Ready};
 use crate::decide::{alternatives, close, decide, shared};
 use crate::diagnosis::{Covered, Details, Diagnosis, Own};
 use crate::find;
@@ -137,22 +137,34 @@ fn sorted<'a>(
         let ready = Ready::new(&own.vehicle, flights, held_out)?;
         return judged(&own.vehicle, baseline, flights, held_out, ready, own.moments, progress);
     }
-    if ready.moments_fit() == Fit::Quick {
-        // What the file lacks of the moments is slow. They count where what lasts explains all of
-        // it; else they would be read into whatever name takes most of it, or noise of the
-        // gyroscope into a lag.
-        let again = Ready::new(vehicle, flights, held_out)?;
-        let whole = judged(vehicle, None, flights, held_out, again, Moments::All, progress)?;
-        if what_lasts_is_all(&whole.verdict) {
-            return Ok(whole);
-        }
+    let plain = |ready| judged(vehicle, None, flights, held_out, ready, Moments::IfKnown, progress);
+    if ready.gyroscope() != Gyroscope::Strays {
+        return plain(ready);
     }
-    judged(vehicle, None, flights, held_out, ready, Moments::IfKnown, progress)
+    // Such moments count where what lasts explains all of them; else they would be read into
+    // whatever name takes most of it, or noise of the gyroscope into a lag.
+    let again = Ready::new(vehicle, flights, held_out)?;
+    let whole = judged(vehicle, None, flights, held_out, again, Moments::All, progress)?;
+    let explains = what_lasts_is_all(&whole.verdict);
+    if explains && whole.verdict.verdict == Kind::Named {
+        return Ok(whole);
+    }
+    let plain = plain(ready)?;
+    // A few names that these flights do not tell apart are more than none.
+    let says_nothing = [Kind::None, Kind::NotIdentifiable].contains(&plain.verdict.verdict);
+    Ok(if explains && says_nothing { whole } else { plain })
 }
 
-/// Whether effects that last explain all that is above noise.
+/// Whether effects that last explain all that is above noise, one set of them or another.
 fn what_lasts_is_all(verdict: &Verdict) -> bool {
-    verdict.verdict == Kind::Named && verdict.effects.iter().all(|effect| lasts(effect.name))
+    let named = verdict.effects.iter().map(|effect| effect.name);
+    let other = verdict.alternatives.iter().flat_map(|other| other.effects.iter().copied());
+    let leaves_nothing = verdict.leftover.as_ref().is_some_and(|left| left.channels.is_empty());
+    match verdict.verdict {
+        Kind::Named => named.into_iter().all(lasts),
+        Kind::Ambiguous => leaves_nothing && named.chain(other).all(lasts),
+        _ => false,
+    }
 }
 
 /// Whether an effect shows in what lasts of the dynamics.

@@ -18,7 +18,7 @@ const WIND_M_S: f64 = 0.12;
 
 /// Wind velocity: where the air moves to, not where it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ConstantWind<T>(pub(super) [T; 4]);
+pub struct ConstantWind<T>(pub(super) [T; 4]);
 
 impl<T: Real> Effect<T> for ConstantWind<T> {
     const NAME: &'static str = "constant_wind";

@@ -20,7 +20,7 @@ const ANISOTROPIC: usize = 1;
 
 /// Drag in the rotor plane on top of the vehicle's own.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct LinearDrag<T>(pub(super) [T; 4]);
+pub struct LinearDrag<T>(pub(super) [T; 4]);
 
 impl<T: Real> Effect<T> for LinearDrag<T> {
     const NAME: &'static str = "linear_drag";

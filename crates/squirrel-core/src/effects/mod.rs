@@ -63,12 +63,15 @@ pub use battery_sag::BatterySag;
 pub use catalogue::{Acting, Effects, Found, Prepared, Present};
 pub use cg_offset::CgOffset;
 pub use clock::CommandClock;
+pub use constant_wind::ConstantWind;
 pub use gust::{GUST_SCALE_LENGTH_M, GUST_TIME_CONSTANT_S, Gust, GustSpectrum};
+pub use linear_drag::LinearDrag;
 pub use mass_error::MassError;
 pub use payload_swing::{Pendulum, PendulumState, Swing};
 pub use profile::{
     Declared, Fitted, Mimic, Profile, Ratio, Response, Shown, SideOf, Timing, Tolerance, Words,
 };
+pub use quadratic_drag::QuadraticDrag;
 pub use thrust_coefficient::ThrustCoefficient;
 pub use weak_rotor::WeakRotor;
 pub use wing_asymmetry::WingAsymmetry;

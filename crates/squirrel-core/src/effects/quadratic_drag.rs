@@ -15,7 +15,7 @@ const ANISOTROPIC: usize = 1;
 
 /// Drag area on top of the vehicle's own.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct QuadraticDrag<T>(pub(super) [T; 4]);
+pub struct QuadraticDrag<T>(pub(super) [T; 4]);
 
 impl<T: Real> Effect<T> for QuadraticDrag<T> {
     const NAME: &'static str = "quadratic_drag";

@@ -5,7 +5,7 @@ mod effects;
 
 use crate::baseline::Baseline;
 use crate::checked::{Check, EffectCheck, FlightCheck, Shows};
-use crate::compatibility::{self, Fit, Moments, Ready, channels, saturation};
+use crate::compatibility::{self, Gyroscope, Moments, Ready, channels, saturation};
 use crate::flight::series::Span;
 use crate::name::silent_tolerances;
 use crate::predictor::Predictor;
@@ -16,7 +16,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 
 /// As a diagnosis does with such flights.
-const SLOW_MOMENTS: &str = "moments: what is quick of the measured ones follows the vehicle file, what is slow does not; effects that last are looked for in all of them";
+const SLOW_MOMENTS: &str =
+    "moments: where effects that last explain all of the measured ones, they count";
 
 /// Looks at flights before anybody looks for an effect in them.
 ///
@@ -119,7 +120,7 @@ impl Seen<'_> {
             Some(own) => (Ready::new(&own.vehicle, flights, held_out)?, own.moments),
             None => (ready, Moments::IfKnown),
         };
-        let shows_what_lasts = self.own.is_none() && ready.moments_fit() == Fit::Quick;
+        let shows_what_lasts = self.own.is_none() && ready.gyroscope() == Gyroscope::Strays;
         let ready = ready.narrowed(flights, moments)?;
         let scatter = self.own.map(|own| &own.scatter);
         self.effects = effects::effects(&ready, scatter, command_hz(flights))?;

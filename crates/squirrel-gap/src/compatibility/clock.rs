@@ -44,6 +44,8 @@ const FIXES: Bar =
     Bar { f: 25.0, fit: 0.6, by_s: 0.12, left: 0.8, explains: f64::INFINITY, quick: false };
 /// What commands do not explain is mostly noise of the rates' derivative, which has no time.
 const COMMANDS: Bar = Bar { f: 12.0, fit: 0.15, by_s: 0.07, left: 0.7, explains: 1.2, quick: true };
+/// How many times what one shift explains of what is quick a step must.
+const QUICK_EXPLAINS: f64 = 1.4;
 /// On one side of it the clock is right: shifts that effects explain, s.
 const RIGHT_S: (f64, f64) = (-0.1, 0.5);
 /// Steps of two sources this close are one, s.
@@ -139,7 +141,7 @@ fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], bar: &Bar)
         let quick = Blocks::new(time_s, &changes(time_s, own), &changes(time_s, other))?;
         let at = |shift: &dyn Fn(usize) -> i32| quick.fit(0..blocks, shift);
         let one = at(&|_| s0).max(at(&|_| s1));
-        Some(at(&|block| if block < cut { s0 } else { s1 }) > one)
+        Some(at(&|block| if block < cut { s0 } else { s1 }) > QUICK_EXPLAINS * one)
     };
     let step = || Step { by_s, at_s: time_s[0] + cut as f64 * all.block_s };
     (is_real && (!bar.quick || is_quick()?)).then(step)

@@ -72,14 +72,27 @@ impl<'a> Ready<'a> {
         Ok(self)
     }
 
-    /// How much the file's moments have to do with those of a gyroscope; without one, nothing.
-    pub(crate) fn moments_fit(&self) -> Fit {
-        if self.predictor.has_gyroscope() {
-            moments_fit(&self.predictor, &self.nominal)
+    /// What the moments that a gyroscope gives have to do with the file's.
+    pub(crate) fn gyroscope(&self) -> Gyroscope {
+        if !self.predictor.has_gyroscope() {
+            Gyroscope::Missing
+        } else if moments_fit(&self.predictor, &self.nominal) {
+            Gyroscope::Follows
         } else {
-            Fit::Not
+            Gyroscope::Strays
         }
     }
+}
+
+/// What measured moments have to do with those of the vehicle file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Gyroscope {
+    /// No rates were measured as such.
+    Missing,
+    /// They go with them.
+    Follows,
+    /// They do not: the file lacks a large moment, or knows little of this machine.
+    Strays,
 }
 
 /// Flights whose data contradict themselves or repeat another flight, in order.
@@ -211,8 +224,6 @@ const QUICK_FIT: f64 = 0.93;
 /// not know it is 0.1 to 0.2.
 const WHOLE: [f64; 2] = [0.7, 1.4];
 const TELLS: f64 = 0.25;
-/// The first of their changes, which a lag that is off by a little makes larger or smaller.
-const CHANGES: [f64; 2] = [0.5, 2.0];
 
 /// What takes part of the moments of some flights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -237,59 +248,35 @@ pub(crate) fn leave_out(predictor: &mut Predictor<'_>, residual: &[f64], moments
     } else if moments == Moments::Lasting {
         predictor.keep_trim();
     } else if !predictor.has_pitch()
-        || (moments == Moments::IfKnown && moments_fit(predictor, residual) != Fit::Whole)
+        || (moments == Moments::IfKnown && !moments_fit(predictor, residual))
     {
         // What turned a vehicle is not known where its pitch is what its force would have it be.
         predictor.leave_out_moments();
     }
 }
 
-/// How much the vehicle file's moments have to do with the measured ones.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Fit {
-    /// They predict them.
-    Whole,
-    /// They predict what changes from one row to the next: beside a large moment that the file
-    /// lacks, seen through a noisy gyroscope, or of rotors that the file knows little of.
-    Quick,
-    /// They do not.
-    Not,
-}
-
 /// Whether the vehicle file's moments have to do with the measured ones; where they do not, nothing
-/// is named from them. A large moment that the file lacks is slow, as velocity is, and what is
-/// quick still follows the commands. What a gyroscope adds does not change how much of a moment is
-/// in the measured one.
-fn moments_fit(predictor: &Predictor<'_>, residual: &[f64]) -> Fit {
-    let mut fits = Vec::new();
-    let (mut roll_and_pitch, mut quick) = (Products::default(), Products::default());
+/// is named from them by itself. A large moment that the file lacks is slow, as velocity is, and
+/// what is quick still follows the commands. What a gyroscope adds does not change how much of a
+/// moment is in the measured one.
+fn moments_fit(predictor: &Predictor<'_>, residual: &[f64]) -> bool {
+    let (mut fits, mut roll_and_pitch) = (Vec::new(), Products::default());
     for piece in 0..predictor.tracks.len() {
         if predictor.tracks[piece].measured.len() <= 100 {
             continue;
         }
         let flight = Flight::piece(predictor, piece);
         let moments: Pairs = flight.predicted(residual, 3);
-        let (undamped, changes) = (moments.with_damping(&flight.omega()), moments.changes());
+        let undamped = moments.with_damping(&flight.omega());
         let fit = |pairs: &Pairs| pairs.best_shift(flight.step_s(), 0.2);
-        let rows = |shift_s: f64| (shift_s / flight.step_s()).round() as i64;
-        let ((shift_s, own), (shift_of_changes_s, of_changes)) = (fit(&moments), fit(&changes));
-        fits.push([own.max(fit(&undamped).1), of_changes]);
-        roll_and_pitch += moments.products(rows(shift_s));
-        quick += changes.products(rows(shift_of_changes_s));
+        let (shift_s, own) = fit(&moments);
+        fits.push([own.max(fit(&undamped).1), fit(&moments.changes()).1]);
+        roll_and_pitch += moments.products((shift_s / flight.step_s()).round() as i64);
     }
     let mean = |of: usize| fits.iter().map(|fit| fit[of]).sum::<f64>() / fits.len() as f64;
-    let tells = |products: Products, [low, high]: [f64; 2]| {
-        products.correlation() >= TELLS && (low..=high).contains(&products.slope())
-    };
-    if fits.is_empty()
+    fits.is_empty()
         || mean(0) >= MOMENT_FIT
         || mean(1) >= QUICK_FIT
-        || tells(roll_and_pitch, WHOLE)
-    {
-        Fit::Whole
-    } else if tells(quick, CHANGES) {
-        Fit::Quick
-    } else {
-        Fit::Not
-    }
+        || (roll_and_pitch.correlation() >= TELLS
+            && (WHOLE[0]..=WHOLE[1]).contains(&roll_and_pitch.slope()))
 }

@@ -22,7 +22,7 @@ const MUCH_LESS: f64 = 0.6;
 ///
 /// # Errors
 /// What the predictor says.
-pub(crate) fn explain_flights(
+pub(super) fn explain_thrusts(
     predictor: &Predictor<'_>,
     catalogue: &mut Catalogue,
     progress: &dyn Fn(),

@@ -119,7 +119,7 @@ impl Linear {
                 (Other::Height { .. }, _) => Column::default(),
                 // What cannot be off needs no column.
                 _ if sd == 0.0 => Column::default(),
-                (_, Some(before)) if !catalogue.is_of_wings(column) => {
+                (_, Some(before)) if !catalogue.goes_with_members(column) => {
                     std::mem::take(&mut before[column])
                 }
                 (other, _) => {

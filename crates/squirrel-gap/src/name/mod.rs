@@ -13,6 +13,7 @@
 mod ahead;
 mod column;
 mod day;
+mod drag_centre;
 mod evidence;
 mod factor;
 mod forms;
@@ -37,7 +38,7 @@ mod step;
 mod tolerance;
 mod whiten;
 
-pub(crate) use day::explain_flights;
+pub(crate) use ahead::explain_flights;
 pub(crate) use evidence::BETA;
 pub(crate) use linear::settle_flights;
 pub(crate) use parameters::Catalogue;

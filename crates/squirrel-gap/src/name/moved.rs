@@ -39,6 +39,7 @@ impl Search<'_> {
                 Airframe::Torque { rotor } => format!("rotor[{rotor}].torque_fraction"),
                 Airframe::Drag { axis } => format!("drag.linear_n_s_per_m[{axis}]"),
                 Airframe::Wing { axis } => WING_PLACE[axis].to_owned(),
+                Airframe::DragCentre { axis } => format!("drag.centre_body_m[{axis}]"),
             };
         };
         let candidate = &self.catalogue.candidates[parameter.candidate];

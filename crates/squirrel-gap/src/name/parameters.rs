@@ -94,6 +94,9 @@ pub(crate) struct Catalogue {
     pub(crate) parameters: Vec<Parameter>,
     /// Effects that are not among them because these flights lack the channels that show them.
     pub(crate) unseen: Vec<&'static str>,
+    /// Effects that are no longer looked for: they explain what the gyroscope has read, and do not
+    /// help to foretell what it reads next.
+    pub(crate) unforetold: Vec<&'static str>,
     /// Numbers of the airframe beside them, with their tolerances.
     pub(crate) airframe: Vec<(Airframe, f64)>,
     /// By how much thrust may differ from one flight to the next, as a fraction.
@@ -127,6 +130,7 @@ impl Catalogue {
             candidates: Vec::new(),
             parameters: Vec::new(),
             unseen: Vec::new(),
+            unforetold: Vec::new(),
             airframe: airframe(predictor),
             day_fraction: DAY_FRACTION,
             is_of_one_machine: false,

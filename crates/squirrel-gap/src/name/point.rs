@@ -2,7 +2,7 @@
 //! tolerance.
 //!
 //! What may be off beside the catalogue: where each rotor sits and what torque it has, since rotors
-//! of one make scatter; drag along y and z beside that along x; and in each flight the tilt of the
+//! of one make scatter; drag along y and z beside that along x, and where it acts; and in each flight the tilt of the
 //! attitude estimate, how it leans into an acceleration, a little thrust, and the zero of the
 //! barometer, which wanders.
 
@@ -81,21 +81,28 @@ pub(crate) enum Airframe {
     /// Place of the wings along an axis, m: ahead, to each side, below. What the rotors blow at
     /// them goes with it.
     Wing { axis: usize },
+    /// Where the frame's drag acts along an axis, m.
+    DragCentre { axis: usize },
 }
 
 impl Airframe {
-    fn act(self, vehicle: &Vehicle<f64>, x: f64) -> Vehicle<f64> {
+    fn act(self, on: &mut Hypothesis, x: f64) {
+        let vehicle = &on.vehicle;
         let along = |axis: usize| {
             let mut v = Vector3::zeros();
             v[axis] = x;
             v
         };
-        match self {
+        on.vehicle = match self {
             Self::Arm { rotor, axis } => vehicle.with_rotor_off(rotor, In::new(along(axis)), 1.0),
             Self::Torque { rotor } => vehicle.with_rotor_off(rotor, In::zero(), 1.0 + x),
             Self::Drag { axis } => vehicle.with_more_drag(along(axis)),
             Self::Wing { axis } => with_wing_off(vehicle, axis, x),
-        }
+            Self::DragCentre { axis } => {
+                on.drag_centre_m[axis] += x;
+                return;
+            }
+        };
     }
 }
 
@@ -200,7 +207,7 @@ pub(crate) fn hypothesis(
     let others = &point.base[catalogue.parameters.len()..];
     for ((number, _), &x) in catalogue.airframe.iter().zip(others) {
         if x != 0.0 {
-            all.vehicle = number.act(&all.vehicle, x);
+            number.act(&mut all, x);
         }
     }
     let flights = others[catalogue.airframe.len()..].chunks_exact(OF_A_FLIGHT);
@@ -267,11 +274,12 @@ impl Catalogue {
         }
     }
 
-    /// Whether a column is a place of the wings: what it changes goes with what blows on them.
-    pub(crate) fn is_of_wings(&self, column: usize) -> bool {
+    /// Whether a column is a place at which forces act that go with the members: what blows on the
+    /// wings, and drag.
+    pub(crate) fn goes_with_members(&self, column: usize) -> bool {
         let index = column.checked_sub(self.parameters.len());
         let number = index.and_then(|index| self.airframe.get(index));
-        matches!(number, Some((Airframe::Wing { .. }, _)))
+        matches!(number, Some((Airframe::Wing { .. } | Airframe::DragCentre { .. }, _)))
     }
 
     /// The effect that a column changes a number of, with the smallest size of it that is worth
@@ -284,7 +292,7 @@ impl Catalogue {
                 .then_some((self.candidates[parameter.candidate].effect, parameter.smallest));
         }
         match self.airframe.get(column - self.parameters.len())?.0 {
-            Airframe::Arm { .. } | Airframe::Wing { .. } => None,
+            Airframe::Arm { .. } | Airframe::Wing { .. } | Airframe::DragCentre { .. } => None,
             Airframe::Torque { .. } => Some((behind(Declared::Torque)?, TORQUE_FRACTION)),
             Airframe::Drag { .. } => {
                 let drag = self.parameters.iter().find(|p| p.is_behind(Declared::LinearDrag(0)))?;
@@ -306,12 +314,13 @@ impl Catalogue {
         }
     }
 
-    /// Takes the tolerances of one machine: its rotors and wings are where they were.
+    /// Takes the tolerances of one machine: its rotors and wings are where they were, and so is what
+    /// the air pushes at.
     pub(crate) fn take(&mut self, scatter: &Scatter) {
         self.is_of_one_machine = true;
         self.usual = scatter.usual;
         for (number, tolerance) in &mut self.airframe {
-            if matches!(number, Airframe::Arm { .. } | Airframe::Wing { .. }) {
+            if !matches!(number, Airframe::Torque { .. } | Airframe::Drag { .. }) {
                 *tolerance = 0.0;
             }
         }

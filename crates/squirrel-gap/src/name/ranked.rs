@@ -39,7 +39,8 @@ impl Search<'_> {
                 .members
                 .iter()
                 .any(|m| excludes(&self.catalogue.candidates[m.candidate], candidate));
-            if in_set || except.contains(&candidate.effect) {
+            let is_out = |names: &[&str]| names.contains(&candidate.effect);
+            if in_set || is_out(except) || is_out(&self.catalogue.unforetold) {
                 continue;
             }
             let Some(posterior) = set.gram.posterior(&self.widened(set, candidate), BETA) else {

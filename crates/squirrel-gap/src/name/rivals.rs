@@ -4,7 +4,7 @@ use super::evidence::BETA;
 use super::parameters::Candidate;
 use super::point::Member;
 use super::refine::Scored;
-use super::search::{Found, Search};
+use super::search::{Found, NATS_MIN, Search};
 use crate::GapError;
 use squirrel_core::effects::Effects;
 use std::collections::BTreeSet;
@@ -30,12 +30,12 @@ impl Search<'_> {
                 }
                 names.push(self.effect(&member));
                 let members = [without.members.as_slice(), &[member]].concat();
-                all.push(self.score_towards(
-                    &found.linear,
-                    &members,
-                    Some(without),
-                    f64::NEG_INFINITY,
-                )?);
+                let (last, least) = (without.members.len(), f64::NEG_INFINITY);
+                let rival = self.score_towards(&found.linear, &members, Some(without), least)?;
+                // Noise of the gyroscope in the commands is no other explanation.
+                if self.foretells(&rival, last, without)?.is_none_or(|nats| nats >= NATS_MIN) {
+                    all.push(rival);
+                }
                 (self.progress)();
                 if names.len() == RIVALS {
                     break;

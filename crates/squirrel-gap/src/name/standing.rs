@@ -40,8 +40,8 @@ pub(crate) fn standing(
     naming: Naming,
     hold: impl Fn(&Naming) -> Result<Option<Vec<Held>>, GapError>,
 ) -> Result<Naming, GapError> {
-    let naming = foretelling(search, slow::beside_drift(search, naming)?)?;
-    let naming = held(search, clear(search, naming)?, &hold)?;
+    let naming = clear(search, slow::beside_drift(search, naming)?)?;
+    let naming = held(search, naming, &hold)?;
     // What is left of forces alone, or of moments, may be one missing effect: names must explain
     // most of what is there.
     let most = |leftover: &Leftover| leftover.is_in_all || Left::of(leftover).share_removed >= MOST;
@@ -106,22 +106,6 @@ fn clearness(search: &Search<'_>, naming: &Naming, holds: Option<&[Held]>, index
 /// What the predictor says.
 fn clear(search: &Search<'_>, naming: Naming) -> Result<Naming, GapError> {
     dropping(search, naming, |naming| Ok(search.least_clear(naming)))
-}
-
-/// An explanation without those delays and lags that do not help to foretell the gyroscope, whatever
-/// is left then: what fits its noise in the commands.
-///
-/// # Errors
-/// What the predictor says.
-fn foretelling(search: &Search<'_>, mut naming: Naming) -> Result<Naming, GapError> {
-    while naming.gust_m_s.is_none()
-        && let Some(worst) = search.least_foretold(&naming)?
-    {
-        let mut kept = naming.found.best.members.clone();
-        kept.remove(worst);
-        naming = only(search, &naming, &kept)?;
-    }
-    Ok(naming)
 }
 
 /// An explanation that leaves nothing without those names that held-out flights are predicted

@@ -9,7 +9,7 @@
 //! not there fits it. A reading foretold from what was before it cannot be fitted so: its noise is
 //! new (the direct method of identification in closed loop: Ljung, System Identification, 13.4).
 
-use super::{Hypothesis, LED_STEP_S, Predictor, predicted};
+use super::{DragCentre, Hypothesis, LED_STEP_S, Predictor, predicted};
 use crate::GapError;
 use std::f64::consts::TAU;
 
@@ -45,12 +45,13 @@ impl Predictor<'_> {
         let mut squares = [[0.0; 3]; BANDWIDTHS_HZ.len()];
         let mut readings = 0.0;
         let plant = self.plant_at(hypothesis, LED_STEP_S)?;
+        let drag = DragCentre::of(self, hypothesis, LED_STEP_S)?;
         // Every reading, whatever a hypothesis asks for: else the two would be of other readings.
         let paths = self.paths.of(&plant, &self.tracks, &self.commands, |_| 1);
         for (piece, track) in self.tracks.iter().enumerate() {
             let plant = self.plant_in(hypothesis, track.flight, LED_STEP_S)?;
             let (motion, path) = (self.motion(piece, hypothesis), &paths[piece]);
-            let model = predicted(&plant, track, &motion, path);
+            let model = predicted(&plant, drag.as_ref(), track, &motion, path);
             let gyro = &track.omega()[path.first..];
             let dt_s = track.period_s;
             for (squares, bandwidth_hz) in squares.iter_mut().zip(BANDWIDTHS_HZ) {

@@ -16,6 +16,7 @@
 
 mod actuators;
 mod commands;
+mod drag_centre;
 mod innovations;
 mod kept;
 mod noise;
@@ -33,6 +34,7 @@ use crate::GapError;
 use crate::flight::inertial::Common;
 use crate::flight::recording::Recording;
 use actuators::{Path, Paths, stride};
+use drag_centre::DragCentre;
 use kept::Kept;
 use nalgebra::{Vector3, Vector6};
 use squirrel_core::effects::{Effect, Effects, ThrustCoefficient};
@@ -88,6 +90,8 @@ pub(crate) struct Hypothesis {
     /// By what fraction the thrust of each flight is more than the vehicle's: propellers wear, and
     /// packs differ.
     pub(crate) thrust: Vec<f64>,
+    /// Where the frame's drag acts, body frame, m.
+    pub(crate) drag_centre_m: Vector3<f64>,
 }
 
 impl Hypothesis {
@@ -285,6 +289,7 @@ impl<'a> Predictor<'a> {
             effects: self.vehicle.effects,
             errors: vec![SensorErrors::default(); self.names.len()],
             thrust: vec![0.0; self.names.len()],
+            drag_centre_m: Vector3::zeros(),
         }
     }
 
@@ -318,6 +323,7 @@ impl<'a> Predictor<'a> {
         rows: &mut [f64],
     ) -> Result<(), GapError> {
         let plant = self.plant_at(hypothesis, LED_STEP_S)?;
+        let drag = DragCentre::of(self, hypothesis, LED_STEP_S)?;
         let is_asked = |own: usize| flight.is_none_or(|flight| flight == own);
         let days: Vec<Option<Plant>> = (0..self.names.len())
             .map(|flight| hypothesis.in_flight(flight).filter(|_| is_asked(flight)))
@@ -333,7 +339,7 @@ impl<'a> Predictor<'a> {
             }
             let motion = self.motion(piece, hypothesis);
             let own = days[track.flight].as_ref().unwrap_or(&plant);
-            let dynamics = dynamics(own, track, &motion, &paths[piece]);
+            let dynamics = dynamics(own, drag.as_ref(), track, &motion, &paths[piece]);
             while let Some(segment) = segments.next_if(|s| s.piece == piece) {
                 let out = &mut rows[segment.rows.clone()];
                 if segment.channel < DYNAMIC {
@@ -546,16 +552,28 @@ fn lead(
 }
 
 /// Residual of the dynamics of a piece.
-fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<Vector6<f64>> {
+fn dynamics(
+    plant: &Plant,
+    drag: Option<&DragCentre>,
+    track: &Track,
+    motion: &Motion,
+    path: &Path,
+) -> Vec<Vector6<f64>> {
     let filter = if path.stride == 1 { &track.filter } else { &track.model_filter };
-    let predicted = predicted(plant, track, motion, path);
+    let predicted = predicted(plant, drag, track, motion, path);
     let filtered = filter.apply(&predicted, track.edge() - path.first, track.every);
     track.measured.iter().zip(filtered).map(|(measured, model)| measured - model).collect()
 }
 
 /// Specific force and angular acceleration, as the sensors would have them, at each moment of the
 /// path.
-fn predicted(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<Vector6<f64>> {
+fn predicted(
+    plant: &Plant,
+    drag: Option<&DragCentre>,
+    track: &Track,
+    motion: &Motion,
+    path: &Path,
+) -> Vec<Vector6<f64>> {
     let mut jumps = path.before.iter().filter(|_| actuators::jumps(plant.effects())).peekable();
     let mut predicted = Vec::with_capacity(path.moments.len());
     let [rate_scale, _] = track.scales(plant.effects());
@@ -570,7 +588,8 @@ fn predicted(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<
             a = (a + plant.led(&earlier).angular_acceleration) * 0.5;
         }
         let f = track.as_shown(k, led.specific_force.vector, motion, plant.effects());
-        let a = a.vector.component_mul(&rate_scale);
+        let turned = drag.map_or_else(Vector3::zeros, |drag| drag.turns(plant, state));
+        let a = (a.vector + turned).component_mul(&rate_scale);
         predicted.push(Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z));
     });
     predicted

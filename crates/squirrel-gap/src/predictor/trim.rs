@@ -52,13 +52,7 @@ impl Predictor<'_> {
     pub(crate) fn doubt(&self) -> Vec<f64> {
         let mut rows: Vec<f64> = self.measured().iter().map(|x| x * DOUBT).collect();
         let p = self.vehicle.vehicle.parameters();
-        let arm = self
-            .vehicle
-            .vehicle
-            .rotors()
-            .iter()
-            .map(|r| r.position.vector.xy().norm())
-            .fold(0.0, f64::max);
+        let arm = self.arm_m();
         let torque = p.propulsion.torque_coefficient_n_m_s2 / p.propulsion.thrust_coefficient_n_s2;
         let weight_n = p.mass_kg * GRAVITY_M_S2;
         for segment in self.segments.iter().filter(|s| s.is_trim()) {
@@ -70,6 +64,12 @@ impl Predictor<'_> {
             rows[segment.rows.clone()].fill(TRIM_DOUBT * hover);
         }
         rows
+    }
+
+    /// Distance of the farthest rotor from the middle, m.
+    pub(crate) fn arm_m(&self) -> f64 {
+        let rotors = self.vehicle.vehicle.rotors().iter();
+        rotors.map(|rotor| rotor.position.vector.xy().norm()).fold(0.0, f64::max)
     }
 
     /// Keeps of the moments what another set of flights does.

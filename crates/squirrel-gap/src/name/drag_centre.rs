@@ -1,0 +1,95 @@
+//! Where the frame's drag acts: in the middle of the rotors, unless flights ask for another place.
+//!
+//! No file says where, and a few hundredths of an arm make more than the noise of calm flights. What
+//! they turn is then read into rotors that are elsewhere, each by several of its tolerances, and
+//! what those give hides a centre of mass. A place that floats all the time would hide it, too:
+//! drag is what tells a centre of mass that is elsewhere from rotors that all are.
+
+use super::column::Column;
+use super::day::explain_thrusts;
+use super::evidence::BETA;
+use super::point::{Airframe, hypothesis};
+use super::refine::extended;
+use super::{Catalogue, Naming, Search};
+use crate::GapError;
+use crate::predictor::{DYNAMIC, Predictor};
+
+/// How far from the middle it may be along an axis, one standard deviation, over the arm.
+const SD_OF_ARM: f64 = 0.05;
+/// What another place must be worth, nats.
+const WORTH_NATS: f64 = 10.0;
+
+/// The best explanation, with drag that acts elsewhere if flights ask for it.
+///
+/// * `progress` - called after each piece of work
+///
+/// # Errors
+/// What the predictor says.
+pub(super) fn explain_wherever(
+    predictor: &Predictor<'_>,
+    catalogue: &mut Catalogue,
+    progress: &dyn Fn(),
+) -> Result<Naming, GapError> {
+    let naming = explain_thrusts(predictor, catalogue, progress)?;
+    let has_moments = (3..DYNAMIC).all(|channel| predictor.has_all_of(channel));
+    if !has_moments || !predictor.has_channel(0) || catalogue.is_of_one_machine {
+        return Ok(naming);
+    }
+    let named = naming.found.best.members.len();
+    let asked = Search { predictor, catalogue, gust_m_s: None, progress }
+        .worth_of_drag_centre(&naming)?
+        >= WORTH_NATS;
+    // Two names may be the way around one.
+    if !asked && named < 2 {
+        return Ok(naming);
+    }
+    let held = catalogue.airframe.len();
+    let sd_m = SD_OF_ARM * predictor.arm_m();
+    catalogue.airframe.extend((0..3).map(|axis| (Airframe::DragCentre { axis }, sd_m)));
+    let elsewhere = explain_thrusts(predictor, catalogue, progress)?;
+    let search = Search { predictor, catalogue, gust_m_s: elsewhere.gust_m_s, progress };
+    if asked || search.leads_one_in_the_middle(&elsewhere, &naming)? {
+        return Ok(elsewhere);
+    }
+    catalogue.airframe.truncate(held);
+    Ok(naming)
+}
+
+impl Search<'_> {
+    /// Whether an explanation with drag elsewhere is worth it beside one with drag in the middle.
+    fn leads_one_in_the_middle(&self, own: &Naming, other: &Naming) -> Result<bool, GapError> {
+        let (best, rival) = (&own.found.best, &other.found.best);
+        if best.members.len() >= rival.members.len() {
+            return Ok(false);
+        }
+        let rival = self.score(&own.found.linear, &rival.members)?;
+        let mut prior = rival.prior.clone();
+        let first = rival.free.len() + self.catalogue.shared_columns() - 3;
+        prior[first..first + 3].fill(0.0);
+        let held = rival.gram.posterior(&prior, BETA).ok_or(GapError::NotFinite)?;
+        Ok(best.log_evidence >= held.log_evidence + WORTH_NATS)
+    }
+
+    /// Evidence that another place of drag adds to an explanation, nats.
+    fn worth_of_drag_centre(&self, naming: &Naming) -> Result<f64, GapError> {
+        let (linear, best) = (&naming.found.linear, &naming.found.best);
+        let (segments, sd_m) = (&self.predictor.segments, SD_OF_ARM * self.predictor.arm_m());
+        let point = self.settled(best);
+        let about = hypothesis(self.predictor, self.catalogue, &point)?;
+        let residual = self.predictor.residual(&about)?;
+        let mut places = Vec::new();
+        for axis in 0..3 {
+            let mut moved = about.clone();
+            moved.drag_centre_m[axis] += sd_m;
+            let column = Column::of(self.predictor.slope(&residual, &moved, sd_m, None)?);
+            places.push(linear.whitener.apply_to(segments, &column));
+        }
+        let own = best.columns(linear);
+        let known = (0..own.len()).map(Some).chain([None; 3]).collect::<Vec<_>>();
+        let all: Vec<&Column> = own.into_iter().chain(&places).collect();
+        let gram = extended(&best.gram.g, &known, &all, &best.y);
+        let prior = [best.prior.as_slice(), &[sd_m; 3]].concat();
+        let with = gram.posterior(&prior, BETA).ok_or(GapError::NotFinite)?;
+        Ok(with.log_evidence - best.log_evidence)
+    }
+}

@@ -1,0 +1,62 @@
+//! The frame's drag beside the point that the vehicle file's positions refer to.
+//!
+//! ```text
+//! w' += J^-1 (r x F_drag)      F_drag: base drag, linear_drag and quadratic_drag; r: where it acts
+//! ```
+//! No file says where, and a few hundredths of an arm, on which the air's pressure may well act, are
+//! more than the noise of a calm flight: unaccounted for, they are read into rotors that are
+//! elsewhere, and hide a centre of mass that is.
+
+use super::{Hypothesis, Predictor};
+use crate::GapError;
+use nalgebra::Vector3;
+use squirrel_core::effects::{ConstantWind, Effect, Effects, LinearDrag, QuadraticDrag};
+use squirrel_core::frames::In;
+use squirrel_core::vehicle::MAX_ROTORS;
+use squirrel_sim::plant::{Plant, PlantState, WingPlant};
+
+/// Drag that acts elsewhere.
+pub(super) struct DragCentre {
+    at_m: Vector3<f64>,
+    /// The vehicle with nothing but its drag: with rotors that stand still no other force is left.
+    drag: Plant,
+}
+
+impl DragCentre {
+    /// `None` where drag acts where the file's positions are from.
+    ///
+    /// # Errors
+    /// As [`Predictor::plant_at`].
+    pub(super) fn of(
+        predictor: &Predictor<'_>,
+        hypothesis: &Hypothesis,
+        dt_s: f64,
+    ) -> Result<Option<Self>, GapError> {
+        let at_m = hypothesis.drag_centre_m;
+        if at_m == Vector3::zeros() {
+            return Ok(None);
+        }
+        let (mut all, mut effects) = (hypothesis.effects, Effects::none());
+        for name in [LinearDrag::<f64>::NAME, QuadraticDrag::<f64>::NAME, ConstantWind::<f64>::NAME]
+        {
+            if let Some(own) = all.get_mut(name)
+                && let Some(found) = effects.insert(name)
+            {
+                found.values.copy_from_slice(own.values);
+            }
+        }
+        let drag = Plant::new(hypothesis.vehicle, effects, WingPlant::None, None, dt_s)
+            .map_err(|problem| predictor.refused(problem))?;
+        Ok(Some(Self { at_m, drag }))
+    }
+
+    /// What it adds to the angular acceleration at the motion that a state has met, rad/s^2.
+    ///
+    /// * `plant` - whose inertia the vehicle has
+    pub(super) fn turns(&self, plant: &Plant, state: &PlantState) -> Vector3<f64> {
+        let mut still = *state;
+        still.body.rotor_speed_rad_s = [0.0; MAX_ROTORS];
+        let force = self.drag.wrench(&still, In::zero()).force.vector;
+        plant.vehicle().inertia_inverse() * self.at_m.cross(&force)
+    }
+}
