@@ -20,6 +20,10 @@ use squirrel_core::vehicle::{ThrustCurve, Vehicle};
 use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
+/// Part of the held-out error above noise that a name must remove whose form is another one, where
+/// moments have little to do with the file's.
+const MOST_OF_A_GAP: f64 = 0.9;
+
 /// Looks at flights of a vehicle and says which effect its file lacks.
 ///
 /// * `flights` - name and log of each, which the explanation is fitted to
@@ -145,26 +149,33 @@ fn sorted<'a>(
     // whatever name takes most of it, or noise of the gyroscope into a lag.
     let again = Ready::new(vehicle, flights, held_out)?;
     let whole = judged(vehicle, None, flights, held_out, again, Moments::All, progress)?;
-    let explains = what_lasts_is_all(&whole.verdict);
-    if explains && whole.verdict.verdict == Kind::Named {
+    if lasting(&whole.verdict) && whole.verdict.verdict == Kind::Named {
         return Ok(whole);
     }
     let plain = plain(ready)?;
-    // A few names that these flights do not tell apart are more than none.
-    let says_nothing = [Kind::None, Kind::NotIdentifiable].contains(&plain.verdict.verdict);
-    Ok(if explains && says_nothing { whole } else { plain })
+    Ok(if says_more(&whole.verdict, &plain.verdict) { whole } else { plain })
 }
 
-/// Whether effects that last explain all that is above noise, one set of them or another.
-fn what_lasts_is_all(verdict: &Verdict) -> bool {
-    let named = verdict.effects.iter().map(|effect| effect.name);
+/// Whether all names that a verdict tells, or the sets that it does not tell apart, last.
+fn lasting(verdict: &Verdict) -> bool {
     let other = verdict.alternatives.iter().flat_map(|other| other.effects.iter().copied());
-    let leaves_nothing = verdict.leftover.as_ref().is_some_and(|left| left.channels.is_empty());
-    match verdict.verdict {
-        Kind::Named => named.into_iter().all(lasts),
-        Kind::Ambiguous => leaves_nothing && named.chain(other).all(lasts),
-        _ => false,
-    }
+    verdict.effects.iter().map(|effect| effect.name).chain(other).all(lasts)
+}
+
+/// Whether a verdict with all moments says more than one without those that stray: a name whose
+/// form alone differs, which held-out flights want, or a few sets that leave nothing.
+fn says_more(whole: &Verdict, plain: &Verdict) -> bool {
+    let says_nothing = [Kind::None, Kind::NotIdentifiable].contains(&plain.verdict);
+    let leaves_nothing = whole.leftover.as_ref().is_some_and(|left| left.channels.is_empty());
+    let removes_most = whole.gap.as_ref().is_some_and(|gap| gap.removed_fraction >= MOST_OF_A_GAP);
+    lasting(whole)
+        && match whole.verdict {
+            Kind::NamedFormDiffers => {
+                removes_most && (says_nothing || plain.verdict == Kind::Ambiguous)
+            }
+            Kind::Ambiguous => says_nothing && leaves_nothing,
+            _ => false,
+        }
 }
 
 /// Whether an effect shows in what lasts of the dynamics.
@@ -321,4 +332,61 @@ fn covered(predictor: &Predictor) -> Vec<Covered> {
     push("tilt", &mut tilt, "deg", logged);
     push("voltage", &mut voltage, "V", predictor.has_voltage());
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verdict::{Alternative, Gap, Left};
+
+    fn verdict(kind: Kind, alternatives: &[&'static str], removed_fraction: f64) -> Verdict {
+        let alternative = |name: &&'static str| Alternative {
+            effects: vec![*name],
+            evidence_nats: 20.0,
+            numbers: Vec::new(),
+        };
+        let gap = Gap {
+            held_out_flights: vec!["third".to_owned()],
+            before: 1e4,
+            after: 1.0,
+            best_rival: None,
+            removed_fraction,
+            best_rival_removed_fraction: None,
+        };
+        let leftover =
+            Left { share_removed: 0.99, share_left: 0.0, channels: Vec::new(), goes_with: None };
+        Verdict {
+            verdict: kind,
+            effects: Vec::new(),
+            moved: Vec::new(),
+            alternatives: alternatives.iter().map(alternative).collect(),
+            places: Vec::new(),
+            goes_with: None,
+            fly_next: None,
+            gap: Some(gap),
+            leftover: Some(leftover),
+            closed_loop: Vec::new(),
+            model_patch: None,
+            baseline: None,
+            words: String::new(),
+            set_aside: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// A lag or a clock beside the others may be the gyroscope's noise.
+    #[test]
+    fn moments_that_stray_say_more_where_what_lasts_explains_them() {
+        let plain = |kind| verdict(kind, &[], 0.0);
+        let says = |whole: &Verdict, kind| says_more(whole, &plain(kind));
+        let form = verdict(Kind::NamedFormDiffers, &["weak_rotor"], 0.99);
+        assert!(says(&form, Kind::None) && says(&form, Kind::Ambiguous));
+        assert!(!says(&form, Kind::Named));
+        assert!(!says(&verdict(Kind::NamedFormDiffers, &["weak_rotor"], 0.8), Kind::None));
+        assert!(!says(&verdict(Kind::NamedFormDiffers, &["motor_lag"], 0.99), Kind::None));
+        let sets = verdict(Kind::Ambiguous, &["weak_rotor", "cg_offset"], 0.99);
+        assert!(says(&sets, Kind::NotIdentifiable) && !says(&sets, Kind::Ambiguous));
+        assert!(!says(&verdict(Kind::Ambiguous, &["weak_rotor", "clock_step"], 0.99), Kind::None));
+        assert!(!says(&verdict(Kind::OutsideCatalogue, &[], 0.99), Kind::None));
+    }
 }
