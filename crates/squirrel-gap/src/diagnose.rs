@@ -156,10 +156,12 @@ fn sorted<'a>(
     Ok(if says_more(&whole.verdict, &plain.verdict) { whole } else { plain })
 }
 
-/// Whether all names that a verdict tells, or the sets that it does not tell apart, last.
+/// Whether all names that a verdict tells last, those of sets that it does not tell apart as well.
 fn lasting(verdict: &Verdict) -> bool {
-    let other = verdict.alternatives.iter().flat_map(|other| other.effects.iter().copied());
-    verdict.effects.iter().map(|effect| effect.name).chain(other).all(lasts)
+    let is_open = verdict.verdict == Kind::Ambiguous;
+    let sets = verdict.alternatives.iter().filter(|_| is_open);
+    let open = sets.flat_map(|set| set.effects.iter().copied());
+    verdict.effects.iter().map(|effect| effect.name).chain(open).all(lasts)
 }
 
 /// Whether a verdict with all moments says more than one without those that stray: a name whose
@@ -337,13 +339,25 @@ fn covered(predictor: &Predictor) -> Vec<Covered> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict::{Alternative, Gap, Left};
+    use crate::verdict::{Alternative, Gap, Left, NamedEffect};
+    use std::collections::BTreeMap;
 
-    fn verdict(kind: Kind, alternatives: &[&'static str], removed_fraction: f64) -> Verdict {
+    /// With names, as sets that are open where nothing tells them apart.
+    fn verdict(kind: Kind, names: &[&'static str], removed_fraction: f64) -> Verdict {
+        let effect = |name: &&'static str| NamedEffect {
+            name,
+            form: "standard",
+            evidence_nats: 20.0,
+            parameters: BTreeMap::new(),
+        };
         let alternative = |name: &&'static str| Alternative {
             effects: vec![*name],
             evidence_nats: 20.0,
             numbers: Vec::new(),
+        };
+        let (told, others) = match kind {
+            Kind::Ambiguous => names.split_at(names.len().min(1)),
+            _ => (names, ["accel_scale"].as_slice()),
         };
         let gap = Gap {
             held_out_flights: vec!["third".to_owned()],
@@ -357,9 +371,10 @@ mod tests {
             Left { share_removed: 0.99, share_left: 0.0, channels: Vec::new(), goes_with: None };
         Verdict {
             verdict: kind,
-            effects: Vec::new(),
+            effects: told.iter().map(effect).collect(),
             moved: Vec::new(),
-            alternatives: alternatives.iter().map(alternative).collect(),
+            // Rivals stand beside every name.
+            alternatives: others.iter().map(alternative).collect(),
             places: Vec::new(),
             goes_with: None,
             fly_next: None,
