@@ -36,11 +36,13 @@ impl Search<'_> {
     /// # Errors
     /// What the predictor says.
     fn least_foretold(&self, naming: &Naming) -> Result<Option<&'static str>, GapError> {
+        if naming.gust_m_s.is_some() {
+            return Ok(None);
+        }
         let found = &naming.found;
         let mut least: Option<(f64, usize)> = None;
         for index in 0..found.best.members.len() {
             if let Some(nats) = self.foretells(&found.best, index, &found.without[index])?
-                && naming.gust_m_s.is_none()
                 && nats < NATS_MIN
                 && least.is_none_or(|(worst, _)| nats < worst)
             {

@@ -32,7 +32,11 @@ pub(super) fn explain_wherever(
 ) -> Result<Naming, GapError> {
     let naming = explain_thrusts(predictor, catalogue, progress)?;
     let has_moments = (3..DYNAMIC).all(|channel| predictor.has_all_of(channel));
-    if !has_moments || !predictor.has_channel(0) || catalogue.is_of_one_machine {
+    // Asked for once, beside other candidates, it stays free.
+    let is_free =
+        catalogue.airframe.iter().any(|(number, _)| matches!(number, Airframe::DragCentre { .. }));
+    let could_ask = has_moments && predictor.has_channel(0) && !catalogue.is_of_one_machine;
+    if is_free || !could_ask {
         return Ok(naming);
     }
     let named = naming.found.best.members.len();

@@ -6,7 +6,9 @@
 //!    [`point`], [`evidence`]).
 //! 2. Sets of effects grow, shrink and swap by evidence ([`search`]); each is refined through the
 //!    simulator ([`refine`]), in each of its published forms ([`forms`]).
-//!    What is left of calm air may be gusts ([`gusts`]).
+//!    What is left of calm air may be gusts ([`gusts`]); flights may differ in thrust ([`day`]), drag
+//!    may act elsewhere ([`drag_centre`]), and what does not foretell what comes next is no longer
+//!    looked for ([`ahead`]).
 //! 3. What is left is held against what noise leaves ([`crate::leftover`]); intervals come from
 //!    blocks ([`interval`]). Names stand or fall by both and by held-out flights ([`standing`]).
 
