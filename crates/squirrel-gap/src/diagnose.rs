@@ -181,7 +181,7 @@ fn says_more(whole: &Verdict, plain: &Verdict) -> bool {
 }
 
 /// Whether an effect shows in what lasts of the dynamics.
-pub(crate) fn lasts(name: &str) -> bool {
+fn lasts(name: &str) -> bool {
     Effects::<f64>::profile(name).is_some_and(|profile| profile.shown.has(Shown::LASTING))
 }
 

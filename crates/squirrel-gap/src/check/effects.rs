@@ -3,7 +3,7 @@
 use crate::GapError;
 use crate::checked::{Choice, EffectCheck, NumberCheck, Shows};
 use crate::compatibility::Ready;
-use crate::diagnose::{curve_hides_sag, lasts};
+use crate::diagnose::curve_hides_sag;
 use crate::name::{Catalogue, Scatter, Search, Showable, air_hides_names, catalogue, gust_sizes};
 use crate::predictor::{Predictor, TURNING};
 use squirrel_core::effects::{
@@ -75,15 +75,6 @@ pub(super) fn effects(
         all.push(effect);
     }
     Ok(all)
-}
-
-/// Takes what more channels show of effects that last.
-pub(super) fn take_what_lasts(effects: &mut [EffectCheck], of_more: Vec<EffectCheck>) {
-    for (effect, more) in effects.iter_mut().zip(of_more) {
-        if lasts(effect.name) && more.shown == Shows::Can {
-            *effect = more;
-        }
-    }
 }
 
 /// Takes a number; of one that is looked for from several starts, what all of them show.

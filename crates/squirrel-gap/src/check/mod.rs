@@ -5,7 +5,7 @@ mod effects;
 
 use crate::baseline::Baseline;
 use crate::checked::{Check, EffectCheck, FlightCheck, Shows};
-use crate::compatibility::{self, Gyroscope, Moments, Ready, channels, saturation};
+use crate::compatibility::{self, Moments, Ready, channels, saturation};
 use crate::flight::series::Span;
 use crate::name::silent_tolerances;
 use crate::predictor::Predictor;
@@ -14,10 +14,6 @@ use crate::{GapError, SOURCES, words};
 use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
-
-/// As a diagnosis does with such flights.
-const SLOW_MOMENTS: &str =
-    "moments: where effects that last explain all of the measured ones, they count";
 
 /// Looks at flights before anybody looks for an effect in them.
 ///
@@ -120,17 +116,10 @@ impl Seen<'_> {
             Some(own) => (Ready::new(&own.vehicle, flights, held_out)?, own.moments),
             None => (ready, Moments::IfKnown),
         };
-        let shows_what_lasts = self.own.is_none() && ready.gyroscope() == Gyroscope::Strays;
         let ready = ready.narrowed(flights, moments)?;
         let scatter = self.own.map(|own| &own.scatter);
         self.effects = effects::effects(&ready, scatter, command_hz(flights))?;
         self.notes.extend_from_slice(&ready.predictor.notes);
-        if shows_what_lasts {
-            let whole = Ready::new(vehicle, flights, held_out)?.narrowed(flights, Moments::All)?;
-            let of_all = effects::effects(&whole, scatter, command_hz(flights))?;
-            effects::take_what_lasts(&mut self.effects, of_all);
-            self.notes.push(SLOW_MOMENTS.to_owned());
-        }
         Ok(())
     }
 

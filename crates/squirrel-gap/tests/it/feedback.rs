@@ -8,7 +8,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::In;
 use squirrel_core::math::GRAVITY_M_S2;
-use squirrel_gap::{Kind, Shows, Value, Verdict, check, contradictions, diagnose};
+use squirrel_gap::{Kind, Value, Verdict, contradictions, diagnose};
 use squirrel_log::FlightLog;
 use squirrel_sim::plant::Plant;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -125,19 +125,6 @@ fn a_weak_rotor_is_named_from_a_calm_flight_through_a_noisy_gyroscope() {
     let verdict = verdict(&with_weak_rotor(0.12), how);
     let names: Vec<_> = verdict.effects.iter().map(|effect| effect.name).collect();
     assert_eq!((verdict.verdict, names), (Kind::Named, vec!["weak_rotor"]), "{}", verdict.words);
-}
-
-/// What names it is what a check looks at.
-#[test]
-fn a_check_of_such_a_flight_says_that_a_weak_rotor_shows() {
-    let how = Flown { gyro_rad_s: 0.003, heave: 0.3, hold: 0.2 };
-    let flights = [1, 2].map(|seed| flight(&with_weak_rotor(0.12), seed, how));
-    let found = check(&vehicle(FILE), &flights, &[], &|_| {}).unwrap();
-    let of = |name: &str| found.effects.iter().find(|effect| effect.name == name).unwrap().shown;
-    assert_eq!(of("weak_rotor"), Shows::Can, "{}", found.words);
-    // Noise of the gyroscope makes lags in such flights.
-    assert_eq!(of("motor_lag"), Shows::Cannot, "{}", found.words);
-    assert!(found.notes.iter().any(|note| note.contains("effects that last")));
 }
 
 /// In another order of the rotors that swing would be yaw, which nothing measures as well.
