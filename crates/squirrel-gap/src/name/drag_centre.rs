@@ -8,7 +8,7 @@
 use super::column::Column;
 use super::day::explain_thrusts;
 use super::evidence::BETA;
-use super::point::{Airframe, hypothesis};
+use super::point::Airframe;
 use super::refine::extended;
 use super::{Catalogue, Naming, Search};
 use crate::GapError;
@@ -39,16 +39,16 @@ pub(super) fn explain_wherever(
     if is_free || !could_ask {
         return Ok(naming);
     }
+    let sd_m = SD_OF_ARM * predictor.arm_m();
     let named = naming.found.best.members.len();
     let asked = Search { predictor, catalogue, gust_m_s: None, progress }
-        .worth_of_drag_centre(&naming)?
+        .worth_of_drag_centre(&naming, sd_m)?
         >= WORTH_NATS;
     // Two names may be the way around one.
     if !asked && named < 2 {
         return Ok(naming);
     }
     let held = catalogue.airframe.len();
-    let sd_m = SD_OF_ARM * predictor.arm_m();
     catalogue.airframe.extend((0..3).map(|axis| (Airframe::DragCentre { axis }, sd_m)));
     let elsewhere = explain_thrusts(predictor, catalogue, progress)?;
     let search = Search { predictor, catalogue, gust_m_s: elsewhere.gust_m_s, progress };
@@ -75,15 +75,15 @@ impl Search<'_> {
     }
 
     /// Evidence that another place of drag adds to an explanation, nats.
-    fn worth_of_drag_centre(&self, naming: &Naming) -> Result<f64, GapError> {
+    ///
+    /// * `sd_m` - how far off it may be along an axis
+    fn worth_of_drag_centre(&self, naming: &Naming, sd_m: f64) -> Result<f64, GapError> {
         let (linear, best) = (&naming.found.linear, &naming.found.best);
-        let (segments, sd_m) = (&self.predictor.segments, SD_OF_ARM * self.predictor.arm_m());
-        let point = self.settled(best);
-        let about = hypothesis(self.predictor, self.catalogue, &point)?;
-        let residual = self.predictor.residual(&about)?;
+        let segments = &self.predictor.segments;
+        let residual = self.predictor.residual(&naming.hypothesis)?;
         let mut places = Vec::new();
         for axis in 0..3 {
-            let mut moved = about.clone();
+            let mut moved = naming.hypothesis.clone();
             moved.drag_centre_m[axis] += sd_m;
             let column = Column::of(self.predictor.slope(&residual, &moved, sd_m, None)?);
             places.push(linear.whitener.apply_to(segments, &column));

@@ -2,9 +2,9 @@
 //! tolerance.
 //!
 //! What may be off beside the catalogue: where each rotor sits and what torque it has, since rotors
-//! of one make scatter; drag along y and z beside that along x, and where it acts; and in each flight the tilt of the
-//! attitude estimate, how it leans into an acceleration, a little thrust, and the zero of the
-//! barometer, which wanders.
+//! of one make scatter; drag along y and z beside that along x, and where it acts; and in each
+//! flight the tilt of the attitude estimate, how it leans into an acceleration, a little thrust, and
+//! the zero of the barometer, which wanders.
 
 use super::parameters::{Candidate, Catalogue};
 use crate::GapError;

@@ -339,7 +339,8 @@ impl<'a> Predictor<'a> {
             }
             let motion = self.motion(piece, hypothesis);
             let own = days[track.flight].as_ref().unwrap_or(&plant);
-            let dynamics = dynamics(own, drag.as_ref(), track, &motion, &paths[piece]);
+            let model = predicted(own, drag.as_ref(), track, &motion, &paths[piece]);
+            let dynamics = dynamics(track, &paths[piece], &model);
             while let Some(segment) = segments.next_if(|s| s.piece == piece) {
                 let out = &mut rows[segment.rows.clone()];
                 if segment.channel < DYNAMIC {
@@ -552,16 +553,11 @@ fn lead(
 }
 
 /// Residual of the dynamics of a piece.
-fn dynamics(
-    plant: &Plant,
-    drag: Option<&DragCentre>,
-    track: &Track,
-    motion: &Motion,
-    path: &Path,
-) -> Vec<Vector6<f64>> {
+///
+/// * `predicted` - at each moment of the path
+fn dynamics(track: &Track, path: &Path, predicted: &[Vector6<f64>]) -> Vec<Vector6<f64>> {
     let filter = if path.stride == 1 { &track.filter } else { &track.model_filter };
-    let predicted = predicted(plant, drag, track, motion, path);
-    let filtered = filter.apply(&predicted, track.edge() - path.first, track.every);
+    let filtered = filter.apply(predicted, track.edge() - path.first, track.every);
     track.measured.iter().zip(filtered).map(|(measured, model)| measured - model).collect()
 }
 
