@@ -3,7 +3,7 @@
 
 use crate::diagnosis::{Diagnosis, Own};
 use crate::verdict::{Kind, NamedEffect, Value, nothing_to_add};
-use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind as ParameterKind};
+use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind as ParameterKind, forms};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::fmt::Write;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, value};
@@ -257,25 +257,39 @@ fn chosen_form(parameters: &[EffectParameter], values: &[f64]) -> &'static str {
     chosen.unwrap_or("standard")
 }
 
-/// A rotor gives less by the fraction of a weak rotor.
+/// A rotor gives what an effect makes of it.
 fn weaken(
     document: &mut DocumentMut,
     vehicle: &VehicleFile,
     effect: &NamedEffect,
     source: &str,
 ) -> Result<(), String> {
-    let number = |key: &str| match effect.parameters.get(key) {
-        Some(Value::Number { value, .. }) => Ok(*value),
-        _ => Err(format!("{}: {} twice: a file takes one", vehicle.name, effect.name)),
-    };
-    let (rotor, loss) = (number("rotor")? as usize - 1, number("thrust_loss_fraction")?);
-    let table = rotor_table(document, vehicle, rotor)?;
-    for key in ["thrust_fraction", "torque_fraction"] {
-        let had = match table.get(key) {
-            Some(item) => item.get("value").unwrap_or(item).as_float().unwrap_or(1.0),
-            None => 1.0,
+    let twice = || format!("{}: {} twice: a file takes one", vehicle.name, effect.name);
+    let mut alone = Effects::none();
+    let found = alone.insert(effect.name).ok_or_else(twice)?;
+    let form = forms(found.parameters).iter().position(|form| *form == effect.form);
+    for (value, parameter) in found.values.iter_mut().zip(found.parameters) {
+        *value = match effect.parameters.get(parameter.key) {
+            Some(Value::Number { value, .. }) => *value,
+            _ if parameter.key == FORM => form.unwrap_or(0) as f64,
+            _ => return Err(twice()),
         };
-        table.insert(key, with_source(had * (1.0 - loss), source));
+    }
+    let weak = alone.alter(&vehicle.vehicle).map_err(|e| format!("{}: {e}", vehicle.name))?;
+    let (before, now) = (vehicle.vehicle.rotor_factors(), weak.rotor_factors());
+    for rotor in 0..vehicle.vehicle.rotors().len() {
+        for (which, key) in ["thrust_fraction", "torque_fraction"].into_iter().enumerate() {
+            if now[which][rotor] == before[which][rotor] {
+                continue;
+            }
+            let table = rotor_table(document, vehicle, rotor)?;
+            let had = match table.get(key) {
+                Some(item) => item.get("value").unwrap_or(item).as_float().unwrap_or(1.0),
+                None => 1.0,
+            };
+            let gives = had * now[which][rotor] / before[which][rotor];
+            table.insert(key, with_source(gives, source));
+        }
     }
     Ok(())
 }
@@ -299,12 +313,7 @@ fn with_source(number: f64, source: &str) -> Item {
 
 fn standard_form(effect: &str) -> &'static str {
     let list = Effects::<f64>::parameters(effect).unwrap_or_default();
-    list.iter()
-        .find_map(|p| match p.kind {
-            ParameterKind::OneOf(names) if p.key == FORM => Some(names[0]),
-            _ => None,
-        })
-        .unwrap_or("standard")
+    forms(list).first().copied().unwrap_or("standard")
 }
 
 /// Six digits are more than any interval needs.

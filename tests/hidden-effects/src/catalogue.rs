@@ -217,7 +217,12 @@ pub const CATALOGUE: &[Entry] = &[
         &["asymmetric"],
         &[size("extra_time_constant_s", 0.015, 0.06)],
     ),
-    entry("weak_rotor", Kind::Thrust, &[], &[ROTOR, size("thrust_loss_fraction", 0.05, 0.2)]),
+    entry(
+        "weak_rotor",
+        Kind::Thrust,
+        &["thrust_alone"],
+        &[ROTOR, size("thrust_loss_fraction", 0.05, 0.2)],
+    ),
     entry("mass_error", Kind::Thrust, &[], &[signed("mass_fraction", 0.04, 0.2)]),
     entry("inertia_error", Kind::Moment, &[], &[AXIS, signed("inertia_fraction", 0.12, 0.4)]),
     entry("cg_offset", Kind::Moment, &[], &[CG]),

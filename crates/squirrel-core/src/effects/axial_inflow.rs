@@ -5,7 +5,7 @@
 //! rotor's thrust, in proportion to its speed, `k` of the weight with all at hover; see
 //! [`at_rotors`](super::at_rotors).
 
-use super::{Acts, Declared, Effect, EffectParameter, Forms, Shown, Slopes, Words, is};
+use super::{Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Slopes, Words, is};
 use crate::aero::Airflow;
 use crate::lane::Lane;
 use crate::lane::functions::size;
@@ -22,8 +22,12 @@ pub(super) struct AxialInflow<T>(pub(super) [T; 3]);
 impl<T: Real> Effect<T> for AxialInflow<T> {
     const NAME: &'static str = "axial_inflow";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("gain_s_per_m", 0.012, 0.06).declared(Declared::AxialInflow),
-        EffectParameter::signed("quadratic_s2_per_m2", 4e-3, 0.03).only_in(&["quadratic"]),
+        EffectParameter::signed("gain_s_per_m", 0.012, 0.06)
+            .growing_with(Scale::PerTipSpeed)
+            .declared(Declared::AxialInflow),
+        EffectParameter::signed("quadratic_s2_per_m2", 4e-3, 0.03)
+            .growing_with(Scale::PerTipSpeedSquared)
+            .only_in(&["quadratic"]),
         EffectParameter::form(&["linear", "quadratic", "at_rotors"]),
     ];
     const WORDS: Words = Words {

@@ -80,7 +80,7 @@ pub use wing_membrane::WingMembrane;
 use crate::aero::{Airflow, BodyWrench, flat_plate};
 use crate::frames::{Body, Frame, In};
 use crate::lane::Lane;
-use crate::math::{Real, real};
+use crate::math::{Real, real, sqrt};
 pub use crate::vehicle::Alteration;
 use crate::vehicle::Vehicle;
 use nalgebra::Vector3;
@@ -107,7 +107,8 @@ pub enum Kind {
 
 /// What the plausible sizes of a parameter grow with: the same part of a vehicle's own numbers is
 /// as much on a nano quadrotor as on a large one. Lengths, times and speeds of the catalogue are
-/// those of the air, and stay.
+/// those of the air, and stay, but for the speed that a rotor feels: it counts beside that of its
+/// blades.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
     /// A fraction, an angle, a time or a speed.
@@ -120,21 +121,33 @@ pub enum Scale {
     Arm,
     /// Moments of forces.
     MassTimesArm,
+    /// Gains of thrust over a speed, with the inverse of the blade tips' in hover: the same at the
+    /// same advance ratio.
+    PerTipSpeed,
+    /// The same over a speed squared.
+    PerTipSpeedSquared,
 }
 
-/// Mass, kg, mean inertia about roll and pitch, kg m^2, and mean arm, m, of the vehicle that sizes
-/// are written for: the paper's (Table I).
-const REFERENCE: [f64; 3] = [0.548, 3.95e-3, 0.1202];
+/// Mass, kg, mean inertia about roll and pitch, kg m^2, mean arm, m, and speed of the blade tips in
+/// hover, m/s, of the vehicle that sizes are written for: the paper's (Table I; its propellers are
+/// assumed to have 4 inches).
+const REFERENCE: [f64; 4] = [0.548, 3.95e-3, 0.1202, 76.02];
 
 impl Scale {
     /// How many times the reference vehicle's sizes those of a vehicle are.
     fn of(self, vehicle: &Vehicle<f64>) -> f64 {
         let p = vehicle.parameters();
-        let [mass_kg, inertia_kg_m2, arm_m] = REFERENCE;
+        let [mass_kg, inertia_kg_m2, arm_m, tip_m_s] = REFERENCE;
         let rotors = vehicle.rotors();
         let arms = rotors.iter().map(|rotor| rotor.position.vector.xy().norm());
         let mass = p.mass_kg / mass_kg;
         let arm = arms.sum::<f64>() / (rotors.len().max(1) as f64 * arm_m);
+        let slower = || {
+            let propulsion = &p.propulsion;
+            let per_rotor_n = vehicle.weight_n() / rotors.len().max(1) as f64;
+            let hover_rad_s = sqrt(per_rotor_n / propulsion.thrust_coefficient_n_s2);
+            tip_m_s / (propulsion.propeller_radius_m * hover_rad_s)
+        };
         match self {
             Self::Fixed => 1.0,
             Self::Mass => mass,
@@ -143,6 +156,8 @@ impl Scale {
             }
             Self::Arm => arm,
             Self::MassTimesArm => mass * arm,
+            Self::PerTipSpeed => slower(),
+            Self::PerTipSpeedSquared => slower() * slower(),
         }
     }
 }
@@ -176,6 +191,8 @@ pub struct EffectParameter {
     /// Of a form: whether each is looked for by itself, because what one explains says nothing of
     /// the other.
     pub each_is_sought: bool,
+    /// Of a size with a sign: forms in which nothing makes it negative.
+    pub positive_in: &'static [&'static str],
 }
 
 /// Key of the parameter that chooses the form of an effect.
@@ -184,7 +201,15 @@ pub const FORM: &str = "form";
 impl EffectParameter {
     const fn new(key: &'static str, kind: Kind) -> Self {
         let tolerance = Tolerance::PartOfSmallest;
-        Self { key, kind, forms: None, tolerance, is_capped: false, each_is_sought: false }
+        Self {
+            key,
+            kind,
+            forms: None,
+            tolerance,
+            is_capped: false,
+            each_is_sought: false,
+            positive_in: &[],
+        }
     }
     /// A size that is not negative.
     const fn size(key: &'static str, smallest: f64, largest: f64) -> Self {
@@ -228,7 +253,17 @@ impl EffectParameter {
         self.each_is_sought = true;
         self
     }
-    /// Its plausible sizes on a vehicle; `None` for what counts or chooses.
+    /// The same size, never negative in some forms.
+    const fn positive_in(mut self, forms: &'static [&'static str]) -> Self {
+        self.positive_in = forms;
+        self
+    }
+    /// Its plausible sizes on a vehicle in a form; `None` for what counts or chooses.
+    pub fn range_in(&self, form: &str, vehicle: &Vehicle<f64>) -> Option<SizeRange> {
+        let range = self.range(vehicle)?;
+        Some(SizeRange { signed: range.signed && !self.positive_in.contains(&form), ..range })
+    }
+    /// Its plausible sizes on a vehicle in any form; `None` for what counts or chooses.
     pub fn range(&self, vehicle: &Vehicle<f64>) -> Option<SizeRange> {
         let Kind::Size { smallest, largest, signed, scale } = self.kind else { return None };
         let times = scale.of(vehicle);

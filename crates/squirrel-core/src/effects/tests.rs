@@ -4,7 +4,7 @@ use super::*;
 use crate::aero::Air;
 use crate::frames::Wrench;
 use crate::vehicle::fixtures::squirrel;
-use crate::vehicle::{MAX_ROTORS, RotorAir, Vehicle, Wing};
+use crate::vehicle::{MAX_ROTORS, RotorAir, Vehicle, VehicleParameters, Wing};
 use nalgebra::Vector3;
 
 const HEIGHT_M: f64 = 0.3;
@@ -289,8 +289,41 @@ fn sizes_and_signs_by_hand() {
     close(weak.thrust[2] / nominal.thrust[2], 0.8, "the third rotor");
     close(weak.yaw[2] / nominal.yaw[2], 0.8, "and its torque");
     close(weak.thrust[1] / nominal.thrust[1], 1.0, "no other");
+    let chipped = formed("weak_rotor", "thrust_alone", &[3.0, 0.2]).alter(&vehicle()).unwrap();
+    let chipped = *chipped.rotor_wrench_per_speed_squared();
+    close(chipped.thrust[2] / nominal.thrust[2], 0.8, "the third rotor");
+    close(chipped.yaw[2] / nominal.yaw[2], 1.0, "but not its torque");
     let twisted = *altered("yaw_torque_coeff", &[-0.3]).rotor_wrench_per_speed_squared();
     close(twisted.yaw[1] / nominal.yaw[1], 0.7, "yaw torque");
+}
+
+/// A vehicle whose blade tips are half as fast in hover has the paper's plausible sizes at half the
+/// speed, and so at the same advance ratio; the disc alone, or mass and thrust together, do nothing.
+#[test]
+fn gains_over_a_speed_go_with_the_speed_of_blade_tips() {
+    let largest = |p: VehicleParameters<f64>| {
+        let vehicle = Vehicle::new(p).unwrap();
+        [("translational_lift", 0), ("translational_lift", 1), ("axial_inflow", 0)].map(
+            |(name, slot)| {
+                Effects::<f64>::parameters(name).unwrap()[slot].range(&vehicle).unwrap().largest
+            },
+        )
+    };
+    let paper = largest(*vehicle().parameters());
+    for (now, own) in paper.iter().zip([3e-3, 0.02, 0.06]) {
+        assert!((now / own - 1.0).abs() < 1e-3, "{now} for {own}");
+    }
+    let mut slow = *vehicle().parameters();
+    slow.propulsion.thrust_coefficient_n_s2 *= 4.0;
+    for ((now, own), times) in largest(slow).iter().zip(paper).zip([4.0, 2.0, 2.0]) {
+        close(now / own, times, "half the speed");
+    }
+    let mut heavy = *vehicle().parameters();
+    heavy.mass_kg *= 8.0;
+    heavy.propulsion.thrust_coefficient_n_s2 *= 8.0;
+    for (now, own) in largest(heavy).iter().zip(paper) {
+        close(now / own, 1.0, "eight times the mass and the thrust");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@
 //! `at_rotors`: `T + k V_h^2 m g` whatever the thrust, of each rotor its part by the air at its hub;
 //! see [`at_rotors`](super::at_rotors).
 
-use super::{Acts, Declared, Effect, EffectParameter, Forms, Shown, Slopes, Words, is};
+use super::{Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Slopes, Words, is};
 use crate::aero::Airflow;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -25,9 +25,12 @@ impl<T: Real> Effect<T> for TranslationalLift<T> {
     const NAME: &'static str = "translational_lift";
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed("gain_s2_per_m2", 6e-4, 3e-3)
+            .growing_with(Scale::PerTipSpeedSquared)
             .declared(Declared::TranslationalLift)
             .only_in(&["saturating", "quadratic", "at_rotors"]),
-        EffectParameter::signed("gain_s_per_m", 3e-3, 0.02).only_in(&["linear"]),
+        EffectParameter::signed("gain_s_per_m", 3e-3, 0.02)
+            .growing_with(Scale::PerTipSpeed)
+            .only_in(&["linear"]),
         EffectParameter::form(&["saturating", "linear", "quadratic", "at_rotors"]),
     ];
     const WORDS: Words = Words {

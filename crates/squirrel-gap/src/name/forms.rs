@@ -64,9 +64,8 @@ impl Search<'_> {
                 other.values[slot] = form as f64;
                 other.candidate = self.catalogue.other_form(member.candidate, form, slot);
                 for (value, parameter) in other.values.iter_mut().zip(list) {
-                    let Some(range) = parameter.range(&self.predictor.vehicle.vehicle) else {
-                        continue;
-                    };
+                    let vehicle = &self.predictor.vehicle.vehicle;
+                    let Some(range) = parameter.range_in(names[form], vehicle) else { continue };
                     let SizeRange { smallest, largest, signed, .. } = range;
                     match (parameter.exists_in(now), parameter.exists_in(names[form])) {
                         (false, true) if signed => *value = 0.0,

@@ -51,8 +51,10 @@ impl Search<'_> {
             if is_flat { (is * is - was * was).abs().sqrt() } else { (is - was).abs() }
         };
         standard.peek().is_none()
-            || standard
-                .any(|p| off(before[p.slot], member.values[p.slot]) >= TOLERANCES_MIN * p.least())
+            || standard.any(|p| {
+                off(before[p.slot], member.values[p.slot])
+                    >= TOLERANCES_MIN * self.catalogue.least(p)
+            })
     }
 
     /// By how many standard deviations a member's number differs from what the vehicle file has,

@@ -59,12 +59,6 @@ impl Parameter {
         self.within == Tolerance::Declared(number)
     }
 
-    /// What it may be off by without anybody noticing: its tolerance, or of what is there or not, a
-    /// part of the smallest size.
-    pub(super) fn least(&self) -> f64 {
-        if self.tolerance > 0.0 { self.tolerance } else { SHARE_OF_SMALLEST * self.smallest }
-    }
-
     /// A change of the number, no farther from nothing than a vehicle can be, or than its file has
     /// it already.
     ///
@@ -86,6 +80,8 @@ pub(crate) struct Candidate {
     pub(crate) parameters: Vec<usize>,
     /// Slots that only a refinement moves, with where they start.
     pub(crate) shape: Vec<(usize, f64)>,
+    /// Whether it has the one form of the effect that floats: the file's, or the standard one.
+    pub(crate) floats: bool,
 }
 
 /// Everything that can be named on a vehicle.
@@ -237,6 +233,29 @@ impl Catalogue {
         (effect, choices.chain(form).collect())
     }
 
+    /// What a number may be off by without anybody noticing: its tolerance, be it that of another
+    /// form, or of what is there or not, a part of the smallest size.
+    pub(super) fn least(&self, number: &Parameter) -> f64 {
+        let same = |p: &&Parameter| {
+            p.slot == number.slot && self.is_one_thing(p.candidate, number.candidate)
+        };
+        let tolerances = self.parameters.iter().filter(same).map(|p| p.tolerance);
+        let most = tolerances.fold(0.0, f64::max);
+        if most > 0.0 { most } else { SHARE_OF_SMALLEST * number.smallest }
+    }
+
+    /// Candidates of an effect, one for each way in which its choices are made.
+    ///
+    /// * `floats` - those in the form that floats, or those in another that is looked for
+    pub(super) fn each_of(&self, effect: &str, floats: bool) -> Vec<usize> {
+        let all = 0..self.candidates.len();
+        all.filter(|c| {
+            let candidate = &self.candidates[*c];
+            candidate.effect == effect && candidate.floats == floats
+        })
+        .collect()
+    }
+
     /// Tolerances of what has no number of its own.
     ///
     /// * `timing_s` - by how much commands may act beside their time
@@ -265,12 +284,11 @@ impl Catalogue {
         let (form, index, slot) = form.unwrap_or_default();
         let mut effects = vehicle.effects;
         let own = effects.has(effect).then(|| effects.insert(effect).map(|e| e.values[slot]));
-        // An effect has one form, the file's or the standard one: that alone floats.
         let floats =
             !list.iter().any(|p| p.each_is_sought) || index == own.flatten().unwrap_or(0.0);
         let (candidate, mut own, mut started) = (self.candidates.len(), Vec::new(), Vec::new());
         for (slot, parameter) in list.iter().enumerate() {
-            let Some(range) = parameter.range(&vehicle.vehicle) else { continue };
+            let Some(range) = parameter.range_in(form, &vehicle.vehicle) else { continue };
             if !parameter.exists_in(form) {
                 continue;
             }
@@ -297,7 +315,9 @@ impl Catalogue {
                 spread: 0.0,
             });
         }
-        self.candidates.push(Candidate { effect, profile, fixed, parameters: own, shape: started });
+        let parameters = own;
+        let shape = started;
+        self.candidates.push(Candidate { effect, profile, fixed, parameters, shape, floats });
         Ok(())
     }
 }
@@ -316,7 +336,7 @@ pub(super) fn bounds(
         return (if range.signed { -range.largest } else { 0.0 }, range.largest);
     }
     let times = match range.scale {
-        Scale::Fixed | Scale::Arm => LARGEST_TIMES,
+        Scale::Fixed | Scale::Arm | Scale::PerTipSpeed | Scale::PerTipSpeedSquared => LARGEST_TIMES,
         Scale::Mass | Scale::Inertia | Scale::MassTimesArm => GROWING_TIMES,
     };
     let most = times * range.largest;

@@ -35,10 +35,7 @@ impl Search<'_> {
         let offset = set.free.len();
         let mut all = Vec::new();
         for (index, candidate) in self.catalogue.candidates.iter().enumerate() {
-            let in_set = set
-                .members
-                .iter()
-                .any(|m| excludes(&self.catalogue.candidates[m.candidate], candidate));
+            let in_set = set.members.iter().any(|m| self.excludes(m.candidate, index));
             let is_out = |names: &[&str]| names.contains(&candidate.effect);
             if in_set || is_out(except) || is_out(&self.catalogue.unforetold) {
                 continue;
@@ -98,16 +95,23 @@ impl Search<'_> {
             other
         })
     }
-}
 
-/// Whether an effect leaves no room for another: itself, and where flights show a ratio alone, what
-/// stands on its other side.
-fn excludes(named: &Candidate, other: &Candidate) -> bool {
-    let on_one_ratio = ratio(named).is_some() && ratio(named) == ratio(other);
-    // Two rotors may be weak.
-    let rotors = |c: &Candidate| c.effect == WEAK_ROTOR;
-    let same = named.effect == other.effect && !(rotors(named) && named.fixed != other.fixed);
-    same || on_one_ratio
+    /// Whether a candidate leaves no room for another: the effect itself, and where flights show a
+    /// ratio alone, what stands on its other side.
+    fn excludes(&self, named: usize, other: usize) -> bool {
+        let [one, two] = [named, other].map(|c| &self.catalogue.candidates[c]);
+        let on_one_ratio = ratio(one).is_some() && ratio(one) == ratio(two);
+        // Two rotors may be weak. What happened to them is one thing, and so has one form; several in
+        // another than the usual make any moments, and only a machine's good flights tell them.
+        let another_rotor = || {
+            let in_usual_form = [one, two].iter().all(|candidate| candidate.floats);
+            let in_another = self.catalogue.is_of_one_machine && one.floats == two.floats;
+            one.effect == WEAK_ROTOR
+                && (in_usual_form || in_another)
+                && !self.catalogue.is_one_thing(named, other)
+        };
+        on_one_ratio || one.effect == two.effect && !another_rotor()
+    }
 }
 
 /// The ratio of which a candidate, with the choices that it makes, changes one side.

@@ -186,7 +186,7 @@ impl Search<'_> {
     pub(crate) fn range(&self, member: &Member, slot: usize) -> SizeRange {
         let list = Effects::<f64>::parameters(self.effect(member)).unwrap_or_default();
         let chosen = SizeRange { smallest: 1.0, largest: 1.0, signed: true, scale: Scale::Fixed };
-        list[slot].range(&self.predictor.vehicle.vehicle).unwrap_or(chosen)
+        list[slot].range_in(self.form(member), &self.predictor.vehicle.vehicle).unwrap_or(chosen)
     }
 
     /// How far a number of a member may go.

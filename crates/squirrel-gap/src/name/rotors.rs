@@ -2,7 +2,6 @@
 
 use super::evidence::BETA;
 use super::linear::Linear;
-use super::parameters::Parameter;
 use super::point::Member;
 use super::refine::Scored;
 use super::search::{FURTHER_NATS, Found, MEMBERS_MAX, NATS_MIN, Search, WEAK_ROTOR};
@@ -60,50 +59,52 @@ impl Search<'_> {
         if !self.catalogue.is_of_one_machine {
             return Ok(None);
         }
-        let weak: Vec<usize> = (0..self.catalogue.candidates.len())
-            .filter(|c| self.catalogue.candidates[*c].effect == WEAK_ROTOR)
-            .collect();
         let none = self.score(linear, &[])?;
         let mut sets: Vec<(f64, Vec<Member>)> = Vec::new();
-        for chosen in 0_u32..1 << weak.len() {
-            let count = chosen.count_ones() as usize;
-            if !(2..=MEMBERS_MAX.min(weak.len().saturating_sub(1))).contains(&count) {
-                continue;
+        // What happened to the rotors is one thing, and so has one form.
+        for floats in [true, false] {
+            let weak = self.catalogue.each_of(WEAK_ROTOR, floats);
+            for chosen in 0_u32..1 << weak.len() {
+                let count = chosen.count_ones() as usize;
+                if (2..=MEMBERS_MAX.min(weak.len().saturating_sub(1))).contains(&count) {
+                    let own = weak.iter().enumerate().filter(|(i, _)| chosen >> i & 1 == 1);
+                    let own: Vec<usize> = own.map(|(_, candidate)| *candidate).collect();
+                    sets.extend(self.together(&none, &own));
+                }
             }
-            let own =
-                || weak.iter().enumerate().filter(|(i, _)| chosen >> i & 1 == 1).map(|(_, c)| *c);
-            let mut prior = none.prior.clone();
-            let parameters = || own().flat_map(|c| &self.catalogue.candidates[c].parameters);
-            for p in parameters() {
-                prior[*p] = self.catalogue.parameters[*p].slab;
-            }
-            let Some(posterior) = none.gram.posterior(&prior, BETA) else { continue };
-            let members: Vec<Member> = own()
-                .map(|candidate| {
-                    let mut member = self.catalogue.absent(self.predictor, candidate);
-                    for p in &self.catalogue.candidates[candidate].parameters {
-                        let parameter = &self.catalogue.parameters[*p];
-                        let own = member.values[parameter.slot];
-                        member.values[parameter.slot] += parameter.bounded(own, posterior.mean[*p]);
-                    }
-                    member
-                })
-                .collect();
-            sets.push((posterior.log_evidence, members));
         }
         sets.sort_by(|a, b| b.0.total_cmp(&a.0));
         let Some((_, members)) = sets.into_iter().next() else { return Ok(None) };
         self.score(linear, &members).map(Some)
     }
 
+    /// Several candidates at once, with the linear evidence of all and their numbers.
+    fn together(&self, none: &Scored, candidates: &[usize]) -> Option<(f64, Vec<Member>)> {
+        let numbers = |c: usize| self.catalogue.candidates[c].parameters.iter().copied();
+        let mut prior = none.prior.clone();
+        for p in candidates.iter().flat_map(|c| numbers(*c)) {
+            prior[p] = self.catalogue.parameters[p].slab;
+        }
+        let posterior = none.gram.posterior(&prior, BETA)?;
+        let member = |candidate: &usize| {
+            let mut member = self.catalogue.absent(self.predictor, *candidate);
+            for p in numbers(*candidate) {
+                let parameter = &self.catalogue.parameters[p];
+                let own = member.values[parameter.slot];
+                member.values[parameter.slot] += parameter.bounded(own, posterior.mean[p]);
+            }
+            member
+        };
+        Some((posterior.log_evidence, candidates.iter().map(member).collect()))
+    }
+
     /// How each rotor is against what the vehicle file has, if every one may be off; none where the
     /// flights do not show it.
     pub(crate) fn rotors(&self, null: &Scored) -> Vec<RotorHealth> {
         let catalogue = self.catalogue;
-        let effect = |p: &Parameter| catalogue.candidates[p.candidate].effect;
-        let own: Vec<usize> = (0..catalogue.parameters.len())
-            .filter(|c| effect(&catalogue.parameters[*c]) == WEAK_ROTOR)
-            .collect();
+        let each = catalogue.each_of(WEAK_ROTOR, true).into_iter();
+        let own: Vec<usize> =
+            each.flat_map(|c| catalogue.candidates[c].parameters.iter().copied()).collect();
         let mut prior = null.prior.clone();
         for column in &own {
             prior[*column] = catalogue.parameters[*column].slab;

@@ -1,6 +1,7 @@
 //! The search for the set of effects with the most evidence: forward, drop, swap, each step refined
 //! through the simulator.
 
+use super::BEHIND_NATS;
 use super::evidence::BETA;
 use super::linear::Linear;
 use super::off::TOLERANCES_MIN;
@@ -270,7 +271,12 @@ impl Search<'_> {
                 break;
             };
             let least = if best.members.is_empty() { NATS_MIN } else { FURTHER_NATS };
-            let needed = next.members.last().map_or(least, |member| self.needed(member).max(least));
+            let of = |member: &Member| self.needed(member).max(least);
+            let needed = if next.members.len() > best.members.len() {
+                next.members.last().map_or(least, of)
+            } else {
+                BEHIND_NATS
+            };
             if next.log_evidence < best.log_evidence + needed {
                 break;
             }
@@ -282,7 +288,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The best set with one more effect.
+    /// The best set with one more effect, in the place of what it leaves too little of.
     ///
     /// * `beats` - evidence that it must have to matter, nats
     fn best_addition(
@@ -305,14 +311,27 @@ impl Search<'_> {
             let near = beats - GIVEN_UP * (beats - set.log_evidence).max(0.0) - GIVEN_UP_NATS;
             let scored = self.score_towards(linear, &members, Some(set), near)?;
             (self.progress)();
-            if self.is_off(&scored)
-                && best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence)
-            {
+            let Some(scored) = self.without_small(linear, scored)? else { continue };
+            if best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence) {
                 beats = beats.max(scored.log_evidence);
                 best = Some(scored);
             }
         }
         Ok(best)
+    }
+
+    /// A set with a new last member, if that and the others are off. What the new one leaves of an
+    /// earlier member may be too little: then it stands in its place.
+    fn without_small(&self, linear: &Linear, set: Scored) -> Result<Option<Scored>, GapError> {
+        let mut off = set.members.clone();
+        off.retain(|member| self.is_beyond_tolerance(member));
+        let set = match off.len() {
+            all if all == set.members.len() => set,
+            0 => return Ok(None),
+            _ if off.last() != set.members.last() => return Ok(None),
+            _ => self.score(linear, &off)?,
+        };
+        Ok(self.is_off(&set).then_some(set))
     }
 
     /// Drops members that refinement has made too small to be off; whether there were any.
@@ -369,6 +388,8 @@ impl Search<'_> {
                 let without = self.score(linear, &rest)?;
                 if without.log_evidence > best.log_evidence - self.needed(&out) {
                     *best = without;
+                    // What was chosen beside it may have another form alone.
+                    self.choose_forms(linear, best)?;
                     changed = true;
                     break;
                 }

@@ -100,7 +100,8 @@ impl Search<'_> {
                 let weights = own.mean_of(&weights);
                 let deviation = weights.dot(&(&covariance * &weights)).max(0.0).sqrt();
                 let beyond = |chance: f64| {
-                    let least = TOLERANCES_MIN * parameter.least() + chance * deviation;
+                    let least =
+                        TOLERANCES_MIN * self.catalogue.least(parameter) + chance * deviation;
                     if mean[*p] > 0.0 { least / mean[*p] } else { f64::INFINITY }
                 };
                 let mut found = Showable {

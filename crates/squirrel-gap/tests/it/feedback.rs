@@ -127,6 +127,22 @@ fn a_weak_rotor_is_named_from_a_calm_flight_through_a_noisy_gyroscope() {
     assert_eq!((verdict.verdict, names), (Kind::Named, vec!["weak_rotor"]), "{}", verdict.words);
 }
 
+/// A chipped propeller gives less thrust and takes as much torque: the yaw moment that a slower one
+/// lacks is there. Was the thrust of all rotors, or nothing.
+#[test]
+fn a_chipped_propeller_is_a_rotor_that_lacks_thrust_alone() {
+    let chipped = "[effects.weak_rotor]\nrotor = 2\nthrust_loss_fraction = 0.15\nform = \"thrust_alone\"\n\n[limits]";
+    let machine = vehicle_with(FILE, &[("[limits]", chipped)]);
+    let verdict = verdict(&machine, Flown { gyro_rad_s: 0.003, heave: 0.3, hold: 0.2 });
+    let [weak] = verdict.effects.as_slice() else { panic!("{}", verdict.words) };
+    assert_eq!((verdict.verdict, weak.name), (Kind::Named, "weak_rotor"), "{}", verdict.words);
+    assert_eq!(weak.form, "thrust_alone");
+    let Value::Number { value, low, high } = weak.parameters["thrust_loss_fraction"] else {
+        panic!("{weak:?}")
+    };
+    assert!(low < 0.15 && 0.15 < high && (value - 0.15).abs() < 0.02, "{value} {low} {high}");
+}
+
 /// In another order of the rotors that swing would be yaw, which nothing measures as well.
 #[test]
 fn a_weak_rotor_is_no_wrong_order() {

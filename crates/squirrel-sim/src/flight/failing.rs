@@ -121,7 +121,7 @@ impl Failing {
             let kind = kind.name();
             let is_taken = effects.get_mut(effect).is_some();
             match effects.insert(effect) {
-                Some(found) if !is_taken => found.values.copy_from_slice(&values),
+                Some(found) if !is_taken => found.values[..values.len()].copy_from_slice(&values),
                 _ => {
                     return Err(FlightError(format!(
                         "faults.{kind}: the vehicle has effects.{effect} already"

@@ -198,8 +198,10 @@ impl Extras {
             }
             "weak_rotor" => {
                 let rotor = x("rotor") as usize - 1;
-                self.thrust[rotor] *= 1.0 - x("thrust_loss_fraction");
-                self.torque[rotor] *= 1.0 - x("thrust_loss_fraction");
+                let left = 1.0 - x("thrust_loss_fraction");
+                self.thrust[rotor] *= left;
+                // What a blade that is chipped near its root loses of lift it gains in drag.
+                self.torque[rotor] *= if standard { left } else { 1.0 };
             }
             "mass_error" => self.mass *= 1.0 + x("mass_fraction"),
             "inertia_error" => {
