@@ -114,7 +114,8 @@ fn step(
 ) -> Result<(Vehicle<f64>, Effects<f64>), GapError> {
     let (predictor, mut catalogue) = prepared(vehicle, moments, flights)?;
     for parameter in &mut catalogue.parameters {
-        if is_fitted(catalogue.candidates[parameter.candidate].effect) {
+        let candidate = &catalogue.candidates[parameter.candidate];
+        if candidate.floats && is_fitted(candidate.effect) {
             parameter.tolerance = parameter.tolerance.max(parameter.largest);
         }
     }

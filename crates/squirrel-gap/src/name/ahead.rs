@@ -8,7 +8,7 @@ use super::refine::Scored;
 use super::search::{NATS_MIN, Search};
 use super::{Catalogue, Naming};
 use crate::GapError;
-use crate::predictor::{DYNAMIC, Predictor};
+use crate::predictor::{DYNAMIC, Hypothesis, Predictor};
 use squirrel_core::effects::Shown;
 
 /// The best explanation, of effects that help to foretell what comes next.
@@ -71,7 +71,16 @@ impl Search<'_> {
         if !acts_on_commands || !has_moments {
             return Ok(None);
         }
-        let of = |set| self.predictor.innovations(&self.hypothesis(&self.whole(set))?);
-        Ok(of(set)?.zip(of(without)?).map(|(with, without)| without.behind(&with)))
+        let of = |hypothesis: &Hypothesis| self.predictor.innovations(hypothesis);
+        let whole = |set| self.hypothesis(&self.whole(set));
+        let Some(with) = of(&whole(set)?)? else { return Ok(None) };
+        let mut least = f64::INFINITY;
+        // What floats without it may have gone after the same noise: the file as it is has not.
+        for other in [whole(without)?, self.predictor.nominal()] {
+            if let Some(other) = of(&other)? {
+                least = least.min(other.behind(&with));
+            }
+        }
+        Ok(Some(least))
     }
 }

@@ -21,7 +21,7 @@ impl Search<'_> {
         (self.progress)();
         let better = scored.log_evidence - self.needs(&scored.members)
             > best.log_evidence - self.needs(&best.members);
-        if !(better && self.is_off(&scored)) {
+        if !better {
             return Ok(None);
         }
         let beaten = std::mem::replace(best, scored).members;
@@ -42,7 +42,7 @@ impl Search<'_> {
         };
         let is_more = scored.members.len() > own.len() && own.iter().all(has);
         let is_better = scored.log_evidence >= found.best.log_evidence + BEHIND_NATS;
-        Ok((is_more && is_better && self.is_off(&scored)).then_some(scored))
+        Ok((is_more && is_better).then_some(scored))
     }
 
     /// What a set must be worth, nats. What happened to the rotors is one thing: how many of them
@@ -53,17 +53,18 @@ impl Search<'_> {
         NATS_MIN + FURTHER_NATS * (things.max(1) - 1) as f64
     }
 
-    /// The best set of several weak rotors and nothing else; `None` where the vehicle is no machine
+    /// The best set of several weak rotors and nothing else, all of them off; `None` where the vehicle is no machine
     /// with good flights.
     fn best_rotors(&self, linear: &Linear) -> Result<Option<Scored>, GapError> {
         if !self.catalogue.is_of_one_machine {
             return Ok(None);
         }
         let none = self.score(linear, &[])?;
-        let mut sets: Vec<(f64, Vec<Member>)> = Vec::new();
+        let mut best: Option<Scored> = None;
         // What happened to the rotors is one thing, and so has one form.
         for floats in [true, false] {
             let weak = self.catalogue.each_of(WEAK_ROTOR, floats);
+            let mut sets = Vec::new();
             for chosen in 0_u32..1 << weak.len() {
                 let count = chosen.count_ones() as usize;
                 if (2..=MEMBERS_MAX.min(weak.len().saturating_sub(1))).contains(&count) {
@@ -72,13 +73,20 @@ impl Search<'_> {
                     sets.extend(self.together(&none, &own));
                 }
             }
+            let Some((_, members)) = sets.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) else {
+                continue;
+            };
+            let scored = self.score(linear, &members)?;
+            let leads = |b: &Scored| scored.log_evidence > b.log_evidence + BEHIND_NATS;
+            if self.is_off(&scored) && best.as_ref().is_none_or(leads) {
+                best = Some(scored);
+            }
         }
-        sets.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let Some((_, members)) = sets.into_iter().next() else { return Ok(None) };
-        self.score(linear, &members).map(Some)
+        Ok(best)
     }
 
-    /// Several candidates at once, with the linear evidence of all and their numbers.
+    /// Several candidates at once, with the linear evidence of all and their numbers; `None` where
+    /// flights ask for some of one that is not there by less than nothing.
     fn together(&self, none: &Scored, candidates: &[usize]) -> Option<(f64, Vec<Member>)> {
         let numbers = |c: usize| self.catalogue.candidates[c].parameters.iter().copied();
         let mut prior = none.prior.clone();
@@ -86,6 +94,10 @@ impl Search<'_> {
             prior[p] = self.catalogue.parameters[p].slab;
         }
         let posterior = none.gram.posterior(&prior, BETA)?;
+        let may_be = |p: usize| self.catalogue.parameters[p].signed || posterior.mean[p] > 0.0;
+        if !candidates.iter().flat_map(|c| numbers(*c)).all(may_be) {
+            return None;
+        }
         let member = |candidate: &usize| {
             let mut member = self.catalogue.absent(self.predictor, *candidate);
             for p in numbers(*candidate) {

@@ -187,8 +187,9 @@ fn the_page_and_the_json_have_what_was_found() {
     let json = serde_json::to_value(&found).unwrap();
     let effects = json["effects"].as_array().unwrap();
     let weak = effects.iter().find(|effect| effect["name"] == "weak_rotor").unwrap();
-    assert_eq!(weak["numbers"].as_array().unwrap().len(), 4, "one a rotor");
-    assert_eq!(weak["numbers"][2]["choices"]["rotor"], 3);
+    assert_eq!(weak["numbers"].as_array().unwrap().len(), 8, "one a rotor in each form");
+    assert_eq!(weak["numbers"][4]["choices"]["rotor"], 3);
+    assert_eq!(weak["numbers"][5]["choices"]["form"], "thrust_alone");
     assert!(effects.iter().all(|e| e["shown"] == "can" || e["shown"] == "cannot"));
     assert_eq!(json["flights"][1]["is_held_out"], true);
 }
