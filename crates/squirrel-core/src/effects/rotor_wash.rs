@@ -16,10 +16,11 @@
 
 use super::{Acts, Effect, EffectParameter, Forms, Mimic, Shown, Situation, Words, absent, is};
 use crate::aero::{BodyWrench, flat_plate, induced};
-use crate::lane::Lane;
+use crate::lane::{Lane, Several};
 use crate::math::{AIR_DENSITY_KG_M3, Real, real, sqrt};
 use crate::numbers;
 use crate::vehicle::{MAX_ROTORS, Vehicle};
+use core::array::from_fn;
 
 const JETS: usize = 0;
 const OF_THRUST: usize = 1;
@@ -126,23 +127,40 @@ fn shared<L: Lane>([from, to]: [L; 2], middle: L, half: L) -> [L; 2] {
     [(high - low).upper(L::of(0.0)), L::of(0.5) * (low + high)]
 }
 
+/// Rotors whose jets are computed side by side.
+const BESIDE: usize = 4;
+
 impl<L: Lane> Numbers<L> {
-    /// What the jet of one rotor does to both wings.
+    /// Where the jets of some rotors meet the wings' level and how hard they press there: ahead, to
+    /// the right, m, and the pressure, Pa.
     #[inline(always)]
-    fn jet(&self, at: &Situation<'_, L>, rotor: usize, own: &[L; 2]) -> BodyWrench<L> {
-        let none = L::of(0.0);
-        let [u, v, w] = at.flow.velocity;
+    fn jets(&self, at: &Situation<'_, L>, first: usize) -> [Several<L, BESIDE>; 3] {
+        let all = Several::all;
+        let of = |numbers: &[L]| {
+            Several(from_fn(|i| numbers.get(first + i).copied().unwrap_or(L::of(0.0))))
+        };
+        let none = Several::of(0.0);
+        let [u, v, w] = at.flow.velocity.map(all);
         let across = u * u + v * v;
-        let own_speed = at.rotor_speed[rotor];
-        let square = own_speed * own_speed * self.per_square[rotor] * at.thrust_factor;
-        let speed = induced::speed(square, across, none - w) * self.faster;
+        let own_speed = of(at.rotor_speed);
+        let square = own_speed * own_speed * of(&self.per_square) * all(at.thrust_factor);
+        let speed = induced::speed(square, across, none - w) * all(self.faster);
         let down = w - speed;
         let squared = across + down * down;
-        let sine = down / squared.upper(L::of(TINY)).root();
-        let pressure =
-            L::of(0.5 * AIR_DENSITY_KG_M3 * NORMAL_DRAG) * squared * flat_plate::separated(sine);
-        let late = self.gap_m / (speed - w).upper(L::of(SLOWEST_M_S));
-        let (x, y) = (self.x_m[rotor] - u * late, self.y_m[rotor] - v * late);
+        let sine = down / squared.upper(Several::of(TINY)).root();
+        let pressure = Several::of(0.5 * AIR_DENSITY_KG_M3 * NORMAL_DRAG)
+            * squared
+            * flat_plate::separated(sine);
+        let late = all(self.gap_m) / (speed - w).upper(Several::of(SLOWEST_M_S));
+        [of(&self.x_m) - u * late, of(&self.y_m) - v * late, pressure]
+    }
+
+    /// What a jet does to both wings.
+    ///
+    /// * `own` - what each wing has over its area without, Pa
+    #[inline(always)]
+    fn blow(&self, at: &Situation<'_, L>, [x, y, pressure]: [L; 3], own: &[L; 2]) -> BodyWrench<L> {
+        let none = L::of(0.0);
         let [inner, outer] = self.span_m;
         let sides = [[none - outer, none - inner], [inner, outer]];
         let [length, ahead] = shared(self.chord_m, x, self.half_m);
@@ -168,8 +186,12 @@ impl<L: Lane> Acts<L> for Numbers<L> {
             // Of the plate's own air, over its area.
             let mut own = at.wings.normal_forces(at.flow, &[L::of(1.0); 2]);
             own = [own[0] * self.per_area, own[1] * self.per_area];
-            for rotor in 0..at.rotor_speed.len().min(MAX_ROTORS) {
-                sum = sum.plus(&self.jet(at, rotor, &own));
+            let rotors = at.rotor_speed.len().min(MAX_ROTORS);
+            for first in (0..rotors).step_by(BESIDE) {
+                let jets = self.jets(at, first);
+                for i in 0..BESIDE.min(rotors - first) {
+                    sum = sum.plus(&self.blow(at, jets.map(|all| all.0[i]), &own));
+                }
             }
         }
         if forms.has(OF_THRUST) {

@@ -12,6 +12,7 @@
 //! - [`functions`]: `exp`, `ln`, `tanh`, `cbrt` and others as straight lines of these operations
 //! - [`vector`]: vectors and matrices of lanes as plain arrays
 //! - `portable`: registers in plain Rust; those of a processor are in `squirrel-sim`
+//! - `several`: lanes side by side, as of the rotors of one vehicle
 //! - `numbers`: structures of lanes, and how they lie in memory side by side
 
 mod dual;
@@ -19,6 +20,7 @@ pub mod functions;
 mod numbers;
 mod portable;
 mod real;
+mod several;
 pub mod vector;
 
 pub use dual::Dual;
@@ -26,6 +28,7 @@ pub use functions::net_tanh;
 pub use numbers::{load, put, store, take};
 pub use portable::Portable;
 pub use real::{Real, lower, real, sqrt, upper};
+pub use several::Several;
 
 use core::ops::{Add, Div, Mul, Sub};
 

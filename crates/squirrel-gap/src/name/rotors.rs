@@ -53,7 +53,8 @@ impl Search<'_> {
         NATS_MIN + FURTHER_NATS * (things.max(1) - 1) as f64
     }
 
-    /// The best set of several weak rotors and nothing else, all of them off; `None` where the vehicle is no machine
+    /// The best set of several weak rotors and nothing else, all of them off; `None` where the
+    /// vehicle is no machine
     /// with good flights.
     fn best_rotors(&self, linear: &Linear) -> Result<Option<Scored>, GapError> {
         if !self.catalogue.is_of_one_machine {
