@@ -4,7 +4,7 @@ use super::*;
 use crate::aero::Air;
 use crate::frames::Wrench;
 use crate::vehicle::fixtures::squirrel;
-use crate::vehicle::{MAX_ROTORS, RotorAir, Vehicle, VehicleParameters, Wing};
+use crate::vehicle::{MAX_ROTORS, Parameters, RotorAir, Vehicle, Wing};
 use nalgebra::Vector3;
 
 const HEIGHT_M: f64 = 0.3;
@@ -301,7 +301,7 @@ fn sizes_and_signs_by_hand() {
 /// speed, and so at the same advance ratio; the disc alone, or mass and thrust together, do nothing.
 #[test]
 fn gains_over_a_speed_go_with_the_speed_of_blade_tips() {
-    let largest = |p: VehicleParameters<f64>| {
+    let largest = |p: Parameters<f64>| {
         let vehicle = Vehicle::new(p).unwrap();
         [("translational_lift", 0), ("translational_lift", 1), ("axial_inflow", 0)].map(
             |(name, slot)| {

@@ -260,7 +260,7 @@ mod tests {
             NET.step(&mut hidden, &INPUTS[n]);
             assert_eq!(NET.read(&hidden), NET.window(&INPUTS[..=n]));
         }
-        assert_eq!(NET.window::<f32>(&[]), NET.read(&Hidden::new()));
+        assert_eq!(NET.window::<f32>(&[]), NET.read::<f32>(&Hidden::new()));
     }
 
     #[test]

@@ -49,8 +49,8 @@ impl From<&EffectParameter> for ListedParameter {
                     Scale::Inertia => "inertia",
                     Scale::Arm => "arm",
                     Scale::MassTimesArm => "mass times arm",
-                    Scale::PerTipSpeed => "1 over the speed of blade tips in hover",
-                    Scale::PerTipSpeedSquared => "1 over that speed squared",
+                    Scale::PerTipSpeed => "1 / tip speed in hover",
+                    Scale::PerTipSpeedSquared => "1 / square of the tip speed in hover",
                 };
             }
             Kind::Rotor => {}
