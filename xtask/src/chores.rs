@@ -99,14 +99,20 @@ pub(crate) fn test(arguments: &[String]) -> Result<(), String> {
     run(&steps)
 }
 
+/// Benches that take the compiler more than a minute.
+const LONG_TO_COMPILE: [&str; 1] = ["jacobian"];
+
 /// `cargo xtask bench`: whole workspace, so that features and thus the built libraries are those of
 /// `test`; benches by name, because the test harness of the libraries does not know criterion's
-/// arguments.
+/// arguments. `--quick` leaves out what takes far longer to compile than to run.
 pub(crate) fn bench(arguments: &[String]) -> Result<(), String> {
+    let is_quick = arguments.iter().any(|argument| argument == "--quick");
     let mut command = cargo()?;
     command.args(["bench", "--workspace", "--locked"]);
     for name in bench_names(&root()?)? {
-        command.args(["--bench", &name]);
+        if !(is_quick && LONG_TO_COMPILE.contains(&name.as_str())) {
+            command.args(["--bench", &name]);
+        }
     }
     call(command.arg("--").args(arguments))
 }
@@ -294,5 +300,6 @@ mod tests {
         let names = bench_names(Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()).unwrap();
         assert!(names.contains(&"membrane".to_owned()), "{names:?}");
         assert!(names.is_sorted());
+        assert!(LONG_TO_COMPILE.iter().all(|name| names.contains(&(*name).to_owned())));
     }
 }

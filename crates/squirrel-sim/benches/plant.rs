@@ -42,17 +42,6 @@ fn plant_steps(c: &mut Criterion) {
             });
         });
     }
-    // A step that carries derivatives by twelve numbers; beside `membrane_wing`, of which central
-    // differences take 24.
-    let plant =
-        Plant::new(file.vehicle, file.effects, file.wing.clone(), file.battery.clone(), 1e-3)
-            .expect("sound");
-    let command = [0.5, 0.501, 0.5, 0.499, 0.0, 0.0, 0.0, 0.0];
-    let state = start(&plant);
-    group.throughput(Throughput::Elements(1));
-    group.bench_function("membrane_wing_with_jacobian", |b| {
-        b.iter(|| plant.jacobian(black_box(&state), black_box(&command), [1.0; 2], In::zero()));
-    });
     group.finish();
 }
 

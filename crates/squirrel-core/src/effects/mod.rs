@@ -122,7 +122,8 @@ pub enum Scale {
     /// Moments of forces.
     MassTimesArm,
     /// Gains of thrust over a speed, with the inverse of the blade tips' in hover: the same at the
-    /// same advance ratio.
+    /// same advance ratio. Not below the reference vehicle's: most files do not say how large
+    /// propellers are, and what is taken then is too large rather than too small.
     PerTipSpeed,
     /// The same over a speed squared.
     PerTipSpeedSquared,
@@ -146,7 +147,7 @@ impl Scale {
             let propulsion = &p.propulsion;
             let per_rotor_n = vehicle.weight_n() / rotors.len().max(1) as f64;
             let hover_rad_s = sqrt(per_rotor_n / propulsion.thrust_coefficient_n_s2);
-            tip_m_s / (propulsion.propeller_radius_m * hover_rad_s)
+            (tip_m_s / (propulsion.propeller_radius_m * hover_rad_s)).max(1.0)
         };
         match self {
             Self::Fixed => 1.0,

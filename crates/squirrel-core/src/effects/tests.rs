@@ -318,6 +318,11 @@ fn gains_over_a_speed_go_with_the_speed_of_blade_tips() {
     for ((now, own), times) in largest(slow).iter().zip(paper).zip([4.0, 2.0, 2.0]) {
         close(now / own, times, "half the speed");
     }
+    let mut large = *vehicle().parameters();
+    large.propulsion.propeller_radius_m *= 2.0;
+    for (now, own) in largest(large).iter().zip(paper) {
+        assert!((now / own - 1.0).abs() < 1e-3, "tips twice as fast: {now} for {own}");
+    }
     let mut heavy = *vehicle().parameters();
     heavy.mass_kg *= 8.0;
     heavy.propulsion.thrust_coefficient_n_s2 *= 8.0;
