@@ -315,8 +315,7 @@ impl Catalogue {
                 spread: 0.0,
             });
         }
-        let parameters = own;
-        let shape = started;
+        let (parameters, shape) = (own, started);
         self.candidates.push(Candidate { effect, profile, fixed, parameters, shape, floats });
         Ok(())
     }

@@ -54,8 +54,7 @@ impl Search<'_> {
     }
 
     /// The best set of several weak rotors and nothing else, all of them off; `None` where the
-    /// vehicle is no machine
-    /// with good flights.
+    /// vehicle is no machine with good flights.
     fn best_rotors(&self, linear: &Linear) -> Result<Option<Scored>, GapError> {
         if !self.catalogue.is_of_one_machine {
             return Ok(None);

@@ -271,13 +271,14 @@ impl Search<'_> {
                 break;
             };
             let least = if best.members.is_empty() { NATS_MIN } else { FURTHER_NATS };
-            let of = |member: &Member| self.needed(member).max(least);
-            let needed = if next.members.len() > best.members.len() {
-                next.members.last().map_or(least, of)
+            let is_worth_it = if next.members.len() > best.members.len() {
+                let needed =
+                    next.members.last().map_or(least, |member| self.needed(member).max(least));
+                next.log_evidence >= best.log_evidence + needed
             } else {
-                BEHIND_NATS
+                self.weighed(&next) >= self.weighed(best) + BEHIND_NATS
             };
-            if next.log_evidence < best.log_evidence + needed {
+            if !is_worth_it {
                 break;
             }
             *best = next;
