@@ -189,9 +189,9 @@ pub struct EffectParameter {
     pub tolerance: Tolerance,
     /// Whether it is never larger than its largest plausible size, whatever flights ask for.
     pub is_capped: bool,
-    /// Of a form: whether each is looked for by itself, because what one explains says nothing of
-    /// the other.
-    pub each_is_sought: bool,
+    /// Of a form: those that are looked for by themselves beside the standard one, because what one
+    /// explains says nothing of the other.
+    pub sought: &'static [&'static str],
     /// Of a size with a sign: forms in which nothing makes it negative.
     pub positive_in: &'static [&'static str],
 }
@@ -202,15 +202,7 @@ pub const FORM: &str = "form";
 impl EffectParameter {
     const fn new(key: &'static str, kind: Kind) -> Self {
         let tolerance = Tolerance::PartOfSmallest;
-        Self {
-            key,
-            kind,
-            forms: None,
-            tolerance,
-            is_capped: false,
-            each_is_sought: false,
-            positive_in: &[],
-        }
+        Self { key, kind, forms: None, tolerance, is_capped: false, sought: &[], positive_in: &[] }
     }
     /// A size that is not negative.
     const fn size(key: &'static str, smallest: f64, largest: f64) -> Self {
@@ -249,9 +241,9 @@ impl EffectParameter {
         self.is_capped = true;
         self
     }
-    /// The same choice of a form, each looked for by itself.
-    const fn each_sought(mut self) -> Self {
-        self.each_is_sought = true;
+    /// The same choice of a form, some of them looked for by themselves.
+    const fn seeking(mut self, forms: &'static [&'static str]) -> Self {
+        self.sought = forms;
         self
     }
     /// The same size, never negative in some forms.

@@ -40,7 +40,7 @@ impl<T: Real> Effect<T> for RotorWash<T> {
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed("gain", 0.2, 1.5).only_in(&["jets"]),
         EffectParameter::signed("thrust_fraction", 0.03, 0.3).only_in(&["of_thrust"]),
-        EffectParameter::form(&["jets", "of_thrust"]).each_sought(),
+        EffectParameter::form(&["jets", "of_thrust"]).seeking(&["of_thrust"]),
     ];
     const WORDS: Words = Words {
         what: "rotors blowing on the wings",

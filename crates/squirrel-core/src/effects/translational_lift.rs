@@ -31,7 +31,9 @@ impl<T: Real> Effect<T> for TranslationalLift<T> {
         EffectParameter::signed("gain_s_per_m", 3e-3, 0.02)
             .growing_with(Scale::PerTipSpeed)
             .only_in(&["linear"]),
-        EffectParameter::form(&["saturating", "linear", "quadratic", "at_rotors"]),
+        // A factor on thrust is one on its moments, which a force beside it leaves alone.
+        EffectParameter::form(&["saturating", "linear", "quadratic", "at_rotors"])
+            .seeking(&["at_rotors"]),
     ];
     const WORDS: Words = Words {
         what: "lift in forward flight",

@@ -21,7 +21,7 @@ impl<T: Real> Effect<T> for WeakRotor<T> {
             .declared(Declared::Thrust)
             .positive_in(&["thrust_alone"]),
         // The yaw moment of one form is what refutes the other.
-        EffectParameter::form(&["with_torque", "thrust_alone"]).each_sought(),
+        EffectParameter::form(&["with_torque", "thrust_alone"]).seeking(&["thrust_alone"]),
     ];
     const WORDS: Words = Words {
         what: "thrust of rotor @",

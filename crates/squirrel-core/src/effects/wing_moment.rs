@@ -27,7 +27,7 @@ impl<T: Real> Effect<T> for WingMoment<T> {
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed("place_x_m", 0.006, 0.05).growing_with(Scale::Arm),
         EffectParameter::signed("place_z_m", 0.012, 0.05).growing_with(Scale::Arm),
-        EffectParameter::form(&["fixed", "travelling"]).each_sought(),
+        EffectParameter::form(&["fixed", "travelling"]).seeking(&["travelling"]),
     ];
     const WORDS: Words = Words {
         what: "place of the wings' pressure",

@@ -86,7 +86,7 @@ fn add(effect: &mut EffectCheck, catalogue: &Catalogue, found: &Showable) {
         let made = &list[*slot];
         let choice = match made.kind {
             Kind::Rotor => Choice::Number(*value as usize),
-            Kind::OneOf(_) if made.key == FORM && !made.each_is_sought => return None,
+            Kind::OneOf(_) if made.key == FORM && made.sought.is_empty() => return None,
             Kind::OneOf(names) => Choice::Name(names[*value as usize]),
             Kind::Size { .. } => return None,
         };

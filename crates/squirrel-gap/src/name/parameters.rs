@@ -13,7 +13,7 @@ use crate::leftover::{Slack, Usual};
 use crate::predictor::{Predictor, TURNING};
 use squirrel_core::effects::{
     Declared, EffectParameter, Effects, FORM, Kind, Profile, Response, Scale, Shown, SizeRange,
-    Timing, Tolerance,
+    Timing, Tolerance, forms,
 };
 use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::plant::WingPlant;
@@ -206,19 +206,19 @@ impl Catalogue {
         self.in_form(candidate, None) == self.in_form(other, None)
     }
 
-    /// The candidate that is the same effect with the same choices in another form, where each form
-    /// is looked for by itself; otherwise the same one.
+    /// The candidate that is the same effect with the same choices in another form, where that is
+    /// looked for by itself; otherwise that of the standard form.
     ///
     /// * `form` - index of the form, and its slot
     pub(super) fn other_form(&self, candidate: usize, form: usize, slot: usize) -> usize {
-        let wanted = self.in_form(candidate, Some((slot, form as f64)));
-        let all = 0..self.candidates.len();
-        all.into_iter()
-            .find(|other| {
+        let has = |form: f64| {
+            let wanted = self.in_form(candidate, Some((slot, form)));
+            (0..self.candidates.len()).find(|other| {
                 let own = self.candidates[*other].fixed.iter().find(|(s, _)| *s == slot);
                 self.in_form(*other, own.copied()) == wanted
             })
-            .unwrap_or(candidate)
+        };
+        has(form as f64).or_else(|| has(0.0)).unwrap_or(candidate)
     }
 
     /// An effect and its choices, with a form in place of its own.
@@ -284,8 +284,8 @@ impl Catalogue {
         let (form, index, slot) = form.unwrap_or_default();
         let mut effects = vehicle.effects;
         let own = effects.has(effect).then(|| effects.insert(effect).map(|e| e.values[slot]));
-        let floats =
-            !list.iter().any(|p| p.each_is_sought) || index == own.flatten().unwrap_or(0.0);
+        let sought = sought(list);
+        let floats = index == own.flatten().filter(|own| sought.contains(own)).unwrap_or(0.0);
         let (candidate, mut own, mut started) = (self.candidates.len(), Vec::new(), Vec::new());
         for (slot, parameter) in list.iter().enumerate() {
             let Some(range) = parameter.range_in(form, &vehicle.vehicle) else { continue };
@@ -349,13 +349,24 @@ pub(super) fn bounds(
     (-own.min(most), most)
 }
 
+/// Forms of an effect that are looked for by themselves beside the standard one, by their numbers.
+fn sought(list: &[EffectParameter]) -> Vec<f64> {
+    let number = |(i, name)| {
+        let is_sought = list.iter().any(|p| p.sought.contains(name));
+        is_sought.then_some(i as f64)
+    };
+    forms(list).iter().enumerate().filter_map(number).collect()
+}
+
 /// Every way in which the choices of an effect can be made.
 fn choices(list: &[EffectParameter], rotors: usize) -> Vec<Vec<(usize, f64)>> {
     let mut all = vec![Vec::new()];
     for (slot, parameter) in list.iter().enumerate() {
         let values: Vec<f64> = match parameter.kind {
             Kind::Rotor => (1..=rotors).map(|i| i as f64).collect(),
-            Kind::OneOf(_) if parameter.key == FORM && !parameter.each_is_sought => vec![0.0],
+            Kind::OneOf(_) if parameter.key == FORM => {
+                std::iter::once(0.0).chain(sought(list)).collect()
+            }
             Kind::OneOf(names) => (0..names.len()).map(|i| i as f64).collect(),
             Kind::Size { .. } => continue,
         };
