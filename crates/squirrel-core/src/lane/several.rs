@@ -1,6 +1,11 @@
 //! Several lanes side by side: what is computed alike of each rotor of one vehicle, and shares its
 //! instructions or at least the wait for them. Roots and divisions take several times as long as
 //! they keep the processor busy.
+//!
+//! Unlike in [`vector`](super::vector), there are closures in here: they end up in the function that
+//! was compiled for the registers, too. Batches whose rotors blow on wings take 0.70 (AVX2) and 0.78
+//! (AVX-512) of the time that rotor after rotor took; written out without closures they were 3 %
+//! faster, and a single vehicle a fifth slower.
 
 use super::Lane;
 use core::array::from_fn;

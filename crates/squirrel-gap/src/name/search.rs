@@ -326,12 +326,10 @@ impl Search<'_> {
     fn without_small(&self, linear: &Linear, set: Scored) -> Result<Option<Scored>, GapError> {
         let mut off = set.members.clone();
         off.retain(|member| self.is_beyond_tolerance(member));
-        let set = match off.len() {
-            all if all == set.members.len() => set,
-            0 => return Ok(None),
-            _ if off.last() != set.members.last() => return Ok(None),
-            _ => self.score(linear, &off)?,
-        };
+        if off.last() != set.members.last() {
+            return Ok(None);
+        }
+        let set = if off.len() < set.members.len() { self.score(linear, &off)? } else { set };
         Ok(self.is_off(&set).then_some(set))
     }
 
