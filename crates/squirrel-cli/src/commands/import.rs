@@ -31,7 +31,7 @@ pub(crate) struct Import {
     board: bool,
     /// The log of an autopilot: ULog (PX4), dataflash (ArduPilot), blackbox (Betaflight, INAV), micro-SD
     /// (Crazyflie); a ROS 2 bag (MCAP); with --map files or folders of one flight: these, CSV, Parquet,
-    /// MATLAB .mat, MCAP with JSON or protobuf; with --board what the board wrote.
+    /// MATLAB .mat, HDF5, MCAP with JSON or protobuf; with --board what the board wrote.
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Flight log to write.

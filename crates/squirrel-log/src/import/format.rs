@@ -14,14 +14,18 @@ use crate::files;
 /// Bytes that tell every kind.
 const START_BYTES: u64 = 64;
 const PARQUET: &[u8] = b"PAR1";
+/// By itself, and behind the text that MATLAB puts before it.
+const HDF5: [&[u8]; 2] = [b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file"];
 
 /// What a file is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Format {
     Csv,
     Parquet,
-    /// MATLAB.
+    /// MATLAB up to v7.
     Mat,
+    /// HDF5, MATLAB's v7.3 among it.
+    Hdf5,
     Ulog,
     Mcap,
     /// Micro-SD log of a Crazyflie.
@@ -39,7 +43,9 @@ impl Format {
             Self::Ulog => Firmware::Px4,
             Self::ArduPilot => Firmware::ArduPilot,
             Self::Blackbox => Firmware::Blackbox,
-            Self::Csv | Self::Parquet | Self::Mat | Self::Mcap | Self::Usd => return None,
+            Self::Csv | Self::Parquet | Self::Mat | Self::Hdf5 | Self::Mcap | Self::Usd => {
+                return None;
+            }
         })
     }
 }
@@ -62,6 +68,7 @@ pub(super) fn format(path: &Path) -> Result<Format, ImportError> {
         start if is_blackbox(start) => Some(Format::Blackbox),
         start if start.starts_with(mcap::MAGIC) => Some(Format::Mcap),
         start if start.starts_with(PARQUET) => Some(Format::Parquet),
+        start if HDF5.iter().any(|magic| start.starts_with(magic)) => Some(Format::Hdf5),
         [first, ..] if is_usd(*first) => Some(Format::Usd),
         _ => None,
     };
@@ -73,6 +80,7 @@ pub(super) fn format(path: &Path) -> Result<Format, ImportError> {
         "csv" => Ok(Format::Csv),
         "parquet" => Ok(Format::Parquet),
         "mat" => Ok(Format::Mat),
+        "h5" | "hdf5" => Ok(Format::Hdf5),
         "ulg" => Ok(Format::Ulog),
         "mcap" => Ok(Format::Mcap),
         _ if start.is_empty() => Err(ImportError::Empty { file }),
@@ -107,7 +115,7 @@ pub(super) fn starts_with(path: &Path, magic: &[u8]) -> Result<bool, ImportError
 }
 
 /// How a file begins that import does not read, and what makes one of it that it does.
-const CONVERTIBLE: [(&[u8], &str); 4] = [
+const CONVERTIBLE: [(&[u8], &str); 2] = [
     (
         b"#ROSBAG V",
         "a ROS 1 bag; import reads ROS 2's MCAP: `pip install rosbags`, then \
@@ -118,12 +126,6 @@ const CONVERTIBLE: [(&[u8], &str); 4] = [
         "a ROS 2 bag in SQLite; import reads MCAP: `pip install rosbags`, then \
          `rosbags-convert --src FOLDER --dst OTHER --dst-storage mcap`",
     ),
-    (
-        b"MATLAB 7.3 MAT-f",
-        "a MAT-file v7.3 (HDF5); import reads up to v7: in MATLAB `load FILE.mat` and `save -v7 OTHER.mat`, or in Python \
-         `pip install mat73 scipy` and `scipy.io.savemat(\"OTHER.mat\", mat73.loadmat(\"FILE.mat\"))`",
-    ),
-    (b"\x89HDF\r\n\x1a\n", "an HDF5 file; import reads CSV, Parquet and MATLAB's `save -v7`"),
 ];
 
 fn start(path: &Path) -> io::Result<Vec<u8>> {

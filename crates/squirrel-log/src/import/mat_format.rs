@@ -9,43 +9,41 @@ use std::ops::Range;
 
 use miniz_oxide::inflate::{TINFLStatus, decompress_to_vec_zlib_with_limit};
 
+use super::array_file::{ARRAYS_MAX, Array, Arrays, DEPTH_MAX, Numbers};
 use super::number::Kind;
 use crate::files::Budget;
 
 /// Text, an offset that is not used here, version and byte order.
 const HEADER_BYTES: usize = 128;
-/// Deeper nesting than any log has; bounds the recursion.
-const DEPTH_MAX: usize = 32;
-/// Arrays of a file; each element of a list of structures has its own.
-const ARRAYS_MAX: usize = 50_000;
 
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 const COMPLEX: u32 = 0x0800;
 
-/// An array of numbers.
-#[derive(Debug)]
-pub(super) struct Array {
-    /// Variable, fields and elements: `log.imu[0].gyro`.
-    pub(super) path: String,
-    /// Sizes other than 1.
-    pub(super) sizes: Vec<usize>,
-    kind: Kind,
-    /// Which buffer, and where in it.
-    buffer: usize,
-    bytes: Range<usize>,
-}
-
-/// The arrays of a file.
+/// The arrays of a MAT-file of level 5.
 #[derive(Debug, Default)]
-pub(super) struct Arrays {
-    pub(super) all: Vec<Array>,
+pub(super) struct Level5 {
+    all: Vec<Array>,
+    /// Of each array: which buffer, and where in it.
+    places: Vec<(usize, Range<usize>)>,
     big_endian: bool,
     /// The file, and what was packed in it.
     buffers: Vec<Vec<u8>>,
 }
 
-impl Arrays {
+impl Arrays for Level5 {
+    fn all(&self) -> &[Array] {
+        &self.all
+    }
+
+    /// All was unpacked when the arrays were found.
+    fn bytes(&mut self, index: usize, _: &mut Budget) -> Result<&[u8], String> {
+        let (buffer, bytes) = &self.places[index];
+        Ok(&self.buffers[*buffer][bytes.clone()])
+    }
+}
+
+impl Level5 {
     /// Finds the arrays of a file.
     ///
     /// * `budget` - of all packed variables together: a few hundred bytes can unpack to gigabytes
@@ -94,21 +92,6 @@ impl Arrays {
             }
         }
         Ok(arrays)
-    }
-
-    /// A number of an array, by its place in the file.
-    pub(super) fn number(&self, array: &Array, place: usize) -> f64 {
-        let size = array.kind.size();
-        let start = array.bytes.start + place * size;
-        let bytes = self.buffers[array.buffer].get(start..start + size).unwrap_or_default();
-        if !self.big_endian {
-            return array.kind.number(bytes);
-        }
-        let mut swapped = [0; 8];
-        for (to, from) in swapped.iter_mut().zip(bytes.iter().rev()) {
-            *to = *from;
-        }
-        array.kind.number(&swapped[..bytes.len()])
     }
 
     /// Adds the arrays of a matrix.
@@ -163,7 +146,9 @@ impl Arrays {
                 if self.all.len() == ARRAYS_MAX {
                     return Err(format!("more than {ARRAYS_MAX} arrays"));
                 }
-                self.all.push(Array { path, sizes, kind, buffer, bytes: numbers.data });
+                let stored = Numbers::dense(kind, big_endian);
+                self.all.push(Array { path, sizes, numbers: stored });
+                self.places.push((buffer, numbers.data));
                 Ok(())
             }
             // Cells, text, sparse and complex numbers, objects: none of them are columns.
@@ -277,12 +262,12 @@ mod tests {
         let packed = std::fs::read("tests/data/mat/packed.mat").unwrap();
         let whole = Budget::of(packed.len() as u64);
         let mut left = whole.clone();
-        let arrays = Arrays::read(packed.clone(), &mut left).unwrap();
+        let arrays = Level5::read(packed.clone(), &mut left).unwrap();
         let unpacked: usize = arrays.buffers[1..].iter().map(Vec::len).sum();
         assert_eq!(whole.left() - left.left(), unpacked as u64);
         let mut less = whole.clone();
         less.take(whole.left() - unpacked as u64 + 1).unwrap();
-        let error = Arrays::read(packed, &mut less).unwrap_err();
+        let error = Level5::read(packed, &mut less).unwrap_err();
         assert!(error.starts_with("its content is larger than 256 MB"), "{error}");
     }
 }

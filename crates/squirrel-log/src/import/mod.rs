@@ -70,6 +70,7 @@
 //!   foreign clock.
 
 mod ardupilot_file;
+mod array_file;
 mod autopilot;
 mod blackbox_file;
 mod blackbox_frames;
@@ -80,9 +81,9 @@ mod error;
 mod files;
 mod format;
 mod frames;
+mod hdf5_format;
 mod map;
 mod mask;
-mod mat_file;
 mod mat_format;
 mod mcap;
 mod meter;

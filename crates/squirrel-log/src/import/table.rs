@@ -4,12 +4,14 @@
 use std::path::Path;
 
 use super::ardupilot_file::BinFile;
+use super::array_file::ArrayFile;
 use super::blackbox_file::BlackboxFile;
 use super::csv_file::CsvFile;
 use super::error::ImportError;
 use super::format::{Format, format};
+use super::hdf5_format::Hdf5;
 use super::map::ImportMap;
-use super::mat_file::MatFile;
+use super::mat_format::Level5;
 use super::mcap::Logs;
 use super::meter::Meter;
 use super::names::nearest;
@@ -67,7 +69,7 @@ pub(super) fn open<'a>(
     if source.instance.is_some() && !matches!(format, Format::Ulog | Format::ArduPilot) {
         return Err(topic_error("instance", format!("means nothing for `{file}`: leave it out")));
     }
-    let has_topics = !matches!(format, Format::Csv | Format::Parquet | Format::Mat);
+    let has_topics = !matches!(format, Format::Csv | Format::Parquet | Format::Mat | Format::Hdf5);
     if source.topic.is_some() && !has_topics {
         return Err(topic_error("topic", format!("means nothing for `{file}`: leave it out")));
     }
@@ -94,7 +96,8 @@ pub(super) fn open<'a>(
         }
         Format::Blackbox => Box::new(BlackboxFile::open(&file, whole()?, topic, meter)?),
         Format::Mcap => logs.open(map, path, topic, meter)?,
-        Format::Mat => Box::new(MatFile::open(&file, whole()?, meter)?),
+        Format::Mat => Box::new(ArrayFile::open(&file, whole()?, Level5::read, meter)?),
+        Format::Hdf5 => Box::new(ArrayFile::open(&file, whole()?, Hdf5::read, meter)?),
         Format::Usd => Box::new(UsdFile::open(&file, whole()?, topic, meter)?),
     })
 }

@@ -36,7 +36,7 @@ const CHILD_KIB: u64 = (192 + 64) << 10;
 /// Processor time of a thousand files, s: a hang of 5 s shows.
 const CHILD_S: u64 = 5;
 
-const KINDS: [&str; 18] = [
+const KINDS: [&str; 21] = [
     "ulog",
     "ulog-map",
     "ardupilot",
@@ -55,6 +55,9 @@ const KINDS: [&str; 18] = [
     "protobuf",
     "mat",
     "mat-packed",
+    "mat-v73",
+    "hdf5",
+    "hdf5-latest",
 ];
 
 const TABLE: &str = "t,x,y,z\n1,2,3,4\n2,3,4,5\n3.5,-1e-3,nan,7\n";
@@ -81,6 +84,9 @@ fn good(kind: &str) -> Vec<u8> {
         "protobuf" => return fs::read(data("protobuf/flight.mcap")).unwrap(),
         "mat" => return fs::read(data("mat/plain.mat")).unwrap(),
         "mat-packed" => return fs::read(data("mat/packed.mat")).unwrap(),
+        "mat-v73" => return fs::read(data("mat/v73.mat")).unwrap(),
+        "hdf5" => return fs::read(data("hdf5/flight.h5")).unwrap(),
+        "hdf5-latest" => return fs::read(data("hdf5/latest.h5")).unwrap(),
         "usd" => return fs::read(data("crazypad/E8_log00.bin")).unwrap(),
         "csv" => TABLE.repeat(3).into_bytes(),
         "map" => CRAZYPAD.as_bytes().to_vec(),
@@ -185,9 +191,13 @@ fn read(kind: &str, path: &Path) {
             by_map(&topic("/imu", "log_time", "ns", "\"w.x\", \"w.yz[0]\", \"up\""));
         }
         "protobuf" => by_map(&topic("/flight", "log_time", "ns", "\"maybe\"")),
-        "mat" | "mat-packed" => {
-            let map = topic("", "t", "s", "\"log.gyro[0]\"");
+        "mat" | "mat-packed" | "mat-v73" => {
+            let map = topic("", "t", "s", "\"gyro[0]\", \"log.battery.voltage\"");
             by_map(&map.replace("topic = \"\"\n", ""));
+        }
+        "hdf5" | "hdf5-latest" => {
+            let columns = "\"imu.gyro[0]\", \"imu.packed[1]\", \"imu.grows\", \"battery.voltage\"";
+            by_map(&topic("", "t", "s", columns).replace("topic = \"\"\n", ""));
         }
         // A map that is taken reads the file that it was made for.
         _ => {

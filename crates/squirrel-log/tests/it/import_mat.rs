@@ -1,4 +1,4 @@
-//! MAT-files as scipy reads them, protobuf as Foxglove's reader does, and what is wrong with others.
+//! MAT-files as scipy reads them, HDF5 as h5py does, protobuf as Foxglove's reader does, and what is wrong with others.
 
 use super::import_support::Flight;
 use std::collections::BTreeMap;
@@ -44,8 +44,10 @@ fn compare(flight: &Flight, map: &str, file: &str, columns: &[&str], csv: &str) 
 
 #[test]
 fn every_number_of_a_mat_file_is_what_scipy_reads() {
-    for name in ["plain", "packed", "big_endian"] {
-        let (file, csv) = (format!("{name}.mat"), format!("mat/{name}.csv"));
+    for (name, read) in
+        [("plain", "plain"), ("packed", "packed"), ("big_endian", "big_endian"), ("v73", "plain")]
+    {
+        let (file, csv) = (format!("{name}.mat"), format!("mat/{read}.csv"));
         let flight = Flight::new("mat", &[]);
         flight.write(&file, &std::fs::read(data(&format!("mat/{file}"))).unwrap());
         let all = numbers(&csv);
@@ -61,6 +63,44 @@ fn every_number_of_a_mat_file_is_what_scipy_reads() {
         // All but three scalars, which are no series.
         assert_eq!(compared, all.values().map(BTreeMap::len).sum::<usize>() - 3);
     }
+}
+
+#[test]
+fn every_number_of_an_hdf5_file_is_what_h5py_reads() {
+    for name in ["flight", "latest"] {
+        let (file, csv) = (format!("{name}.h5"), format!("hdf5/{name}.csv"));
+        let flight = Flight::new("hdf5", &[]);
+        flight.write(&file, &std::fs::read(data(&format!("hdf5/{file}"))).unwrap());
+        let all = numbers(&csv);
+        let columns: Vec<&str> = all.keys().map(String::as_str).collect();
+        assert_eq!(compare(&flight, &map("", "t", &columns), &file, &columns, &csv), 17 * 40);
+    }
+}
+
+#[test]
+fn what_an_hdf5_file_does_not_give_is_one_line() {
+    let flight = Flight::new("hdf5", &[]);
+    let whole = std::fs::read(data("hdf5/flight.h5")).unwrap();
+    flight.write("f.h5", &whole);
+    for (time, column, problem) in [
+        ("t", "names", "f.h5: no column `names`; nearest: "),
+        ("t", "imu.elsewhere", "f.h5: no column `imu.elsewhere`; nearest: "),
+        (
+            "t",
+            "lzf",
+            "f.h5: `lzf`: packed by what is not read (filter id 32000); `h5repack -f GZIP=4 FILE OTHER` packs it by gzip",
+        ),
+        ("t", "endless", "f.h5: `endless` has 1000000000 samples, its time `t` has 40"),
+        ("endless", "endless", "f.h5: its content is larger than 256 MB"),
+    ] {
+        let error = flight.import(&map("", time, &[column]), &["f.h5"]).unwrap_err();
+        let message = flight.message(&error);
+        assert!(message.starts_with(problem) && message.lines().count() == 1, "{message}");
+    }
+    flight.write("f.h5", &whole[..whole.len() / 2]);
+    let error = flight.import(&map("", "t", &["imu.gyro[0]"]), &["f.h5"]).unwrap_err();
+    let message = flight.message(&error);
+    assert!(message.starts_with("f.h5: ") && message.contains("byte"), "{message}");
 }
 
 #[test]
@@ -92,11 +132,7 @@ fn a_mat_file_that_says_something_else_is_one_line() {
     let mut later = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".to_vec();
     later.resize(512, 0);
     for (bytes, problem) in [
-        (
-            later,
-            "f.mat: a MAT-file v7.3 (HDF5); import reads up to v7: in MATLAB `load FILE.mat` and `save -v7 OTHER.mat`, or in Python \
-             `pip install mat73 scipy` and `scipy.io.savemat(\"OTHER.mat\", mat73.loadmat(\"FILE.mat\"))`",
-        ),
+        (later, "f.mat: invalid HDF5 magic bytes"),
         (plain[..100].to_vec(), "f.mat: ends inside the header, after 100 bytes"),
         (vec![0; 200], "f.mat: no MAT-file of level 5; in MATLAB, `save -v7` writes one"),
         (
@@ -133,14 +169,16 @@ fn a_small_file_that_unpacks_into_a_large_one_is_refused() {
     assert!(said.starts_with("f.mat: its content is larger than 256 MB"), "{said}");
 }
 
-/// Every cut and every flipped byte of two small files: an error of one line or a flight.
+/// Cuts and flipped bytes all over small files: an error of one line or a flight.
 #[test]
-fn no_cut_and_no_flip_of_a_mat_file_ends_the_program() {
+fn no_cut_and_no_flip_of_a_file_of_arrays_ends_the_program() {
     let flight = Flight::new("mat", &[]);
-    for name in ["plain", "packed"] {
-        let whole = std::fs::read(data(&format!("mat/{name}.mat"))).unwrap();
+    for (file, step) in
+        [("mat/plain.mat", 5), ("mat/packed.mat", 5), ("mat/v73.mat", 37), ("hdf5/latest.h5", 37)]
+    {
+        let whole = std::fs::read(data(file)).unwrap();
         let mut told = 0;
-        for at in (0..whole.len()).step_by(5) {
+        for at in (0..whole.len()).step_by(step) {
             let mut flipped = whole.clone();
             flipped[at] ^= 0xff;
             for bytes in [whole[..at].to_vec(), flipped] {
@@ -151,7 +189,7 @@ fn no_cut_and_no_flip_of_a_mat_file_ends_the_program() {
                 }
             }
         }
-        assert!(told > whole.len() / 10, "{told}");
+        assert!(told > whole.len() / step / 2, "{file}: {told}");
     }
 }
 
