@@ -129,11 +129,13 @@ pub(crate) fn decide(
     let fails = gap.as_ref().is_some_and(|gap| gap.after > (1.0 + HELD_OUT_NOISE) * gap.before);
     let is_named_alone = close.is_empty() && !effects.is_empty();
     let is_refuted = fails || is_named_alone && gap.as_ref().is_some_and(stays);
+    // Air whose speed nobody measured leaves something, and it is no other form of a name.
+    let has_motion = search.predictor.has_motion();
     let kind = if effects.is_empty() {
         match (leftover.is_real(), blind.is_empty()) {
-            (true, _) => Kind::OutsideCatalogue,
-            (false, false) => Kind::NotIdentifiable,
+            (true, _) if has_motion || blind.is_empty() => Kind::OutsideCatalogue,
             (false, true) => Kind::None,
+            _ => Kind::NotIdentifiable,
         }
     } else if !open.is_empty() {
         if fails { Kind::OutsideCatalogue } else { Kind::NamedIncomplete }
@@ -146,7 +148,11 @@ pub(crate) fn decide(
             && search.is_plausible(&found.best)
             && shrinks
         {
-            Kind::NamedFormDiffers
+            match (has_motion, close.is_empty()) {
+                (true, _) => Kind::NamedFormDiffers,
+                (false, true) => Kind::NamedIncomplete,
+                (false, false) => Kind::Ambiguous,
+            }
         } else if naming.stands {
             Kind::Ambiguous
         } else {
@@ -194,6 +200,9 @@ pub(crate) fn decide(
     let fly_next = match kind {
         Kind::NamedIncomplete if is_open => {
             Some(words::fly_for(&names_beside(&effects, &alternatives)))
+        }
+        Kind::NotIdentifiable if effects.is_empty() && leftover.is_real() => {
+            Some("the same with attitude and velocity in the log".to_owned())
         }
         Kind::NotIdentifiable if effects.is_empty() => Some(words::fly_for(&blind)),
         Kind::Ambiguous | Kind::NotIdentifiable => {

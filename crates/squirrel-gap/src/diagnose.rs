@@ -142,18 +142,42 @@ fn sorted<'a>(
         return judged(&own.vehicle, baseline, flights, held_out, ready, own.moments, progress);
     }
     let plain = |ready| judged(vehicle, None, flights, held_out, ready, Moments::IfKnown, progress);
-    if ready.gyroscope() != Gyroscope::Strays {
+    // With all moments beside the answer without them.
+    let gyroscope = ready.gyroscope();
+    let is_blown = !ready.predictor.has_motion();
+    let wants_both = match gyroscope {
+        Gyroscope::Missing => false,
+        Gyroscope::Follows => is_blown,
+        Gyroscope::Strays => !is_blown,
+    };
+    if !wants_both {
         return plain(ready);
     }
-    // Such moments count where what lasts explains all of them; else they would be read into
-    // whatever name takes most of it, or noise of the gyroscope into a lag.
     let again = Ready::new(vehicle, flights, held_out)?;
     let whole = judged(vehicle, None, flights, held_out, again, Moments::All, progress)?;
-    if lasting(&whole.verdict) && whole.verdict.verdict == Kind::Named {
+    // Moments that stray count where what lasts explains all of them; else they would be read into
+    // whatever name takes most of it, or noise of the gyroscope into a lag.
+    if !is_blown && lasting(&whole.verdict) && whole.verdict.verdict == Kind::Named {
         return Ok(whole);
     }
     let plain = plain(ready)?;
-    Ok(if says_more(&whole.verdict, &plain.verdict) { whole } else { plain })
+    let takes_whole = if is_blown {
+        names_more(&whole.verdict, &plain.verdict)
+    } else {
+        says_more(&whole.verdict, &plain.verdict)
+    };
+    Ok(if takes_whole { whole } else { plain })
+}
+
+/// Whether a verdict with all moments names all that one without them names, and more: air at an
+/// unknown velocity turns a vehicle, too, and then it names nothing.
+fn names_more(whole: &Verdict, plain: &Verdict) -> bool {
+    let names = |verdict: &Verdict| -> Vec<&str> {
+        let stand = nothing_to_add(verdict).is_none();
+        verdict.effects.iter().filter(|_| stand).map(|effect| effect.name).collect()
+    };
+    let (whole, plain) = (names(whole), names(plain));
+    whole.len() > plain.len() && plain.iter().all(|name| whole.contains(name))
 }
 
 /// Whether all names that a verdict tells last, those of sets that it does not tell apart as well.

@@ -228,6 +228,12 @@ impl Verdict {
     pub fn has_looked_at(&self, flight: &str) -> bool {
         self.set_aside.iter().all(|aside| aside.flight != flight)
     }
+
+    /// Whether something is missing, in flights that do not say how the vehicle moves through the
+    /// air, so that it may be what the catalogue has.
+    pub(crate) fn is_unseen(&self) -> bool {
+        self.verdict == Kind::NotIdentifiable && self.effects.is_empty() && self.goes_with.is_some()
+    }
 }
 
 /// Why a vehicle file has nothing to take from a verdict, in one line; `None` where the verdict
@@ -247,6 +253,10 @@ pub fn nothing_to_add(verdict: &Verdict) -> Option<String> {
         }
         Kind::OutsideCatalogue => {
             "something is missing that the catalogue does not have".to_owned()
+        }
+        Kind::NotIdentifiable if verdict.is_unseen() => {
+            "something is missing, which flights without attitude and velocity do not name"
+                .to_owned()
         }
         Kind::NotIdentifiable if verdict.effects.is_empty() => {
             "nothing is above its tolerance, in flights that would not show every effect".to_owned()

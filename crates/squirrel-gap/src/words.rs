@@ -112,6 +112,10 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool
             "Something is missing that the catalogue does not have; it goes with {goes_with}.{}",
             if effects.is_empty() { String::new() } else { format!(" The nearest name, {effects}, does not account for it.") }
         ),
+        Kind::NotIdentifiable if verdict.is_unseen() => format!(
+            "Something is missing, and without attitude and velocity these flights cannot say what: they would not show {} at any plausible size.",
+            blind.join(", ")
+        ),
         Kind::NotIdentifiable if effects.is_empty() => format!(
             "Nothing above its tolerance shows, but these flights would not show {} at any plausible size.",
             blind.join(", ")

@@ -38,7 +38,7 @@ impl<T: Real> Effect<T> for GroundEffect<T> {
         less: "Less lift near the ground",
         fly: "a ladder of hovers from 0.2 to 1.5 m above the ground, with a range finder if there is one",
     };
-    const SHOWN: Shown = Shown::NOTHING;
+    const SHOWN: Shown = Shown::HEIGHT;
     const RESPONSE: Response = Response::StartsFlat;
     const FITTED: Fitted = Fitted::Never;
     const FEELS_HEIGHT: bool = true;

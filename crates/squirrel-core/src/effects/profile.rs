@@ -44,6 +44,8 @@ impl Shown {
     pub const TURNS: Self = Self(1 << 4);
     /// Horizontal forces.
     pub const HORIZONTAL: Self = Self(1 << 5);
+    /// A height over ground.
+    pub const HEIGHT: Self = Self(1 << 6);
 
     /// Both.
     #[must_use]

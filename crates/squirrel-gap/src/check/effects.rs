@@ -183,6 +183,8 @@ fn lacks(predictor: &Predictor<'_>, profile: &Profile) -> &'static str {
         "the moments of these flights have too little to do with those of the vehicle file, or are not known"
     } else if shown.has(Shown::HORIZONTAL) && !predictor.has_channel(0) {
         "the logs do not say how the vehicle moves through the air: velocity, attitude and heading"
+    } else if shown.has(Shown::HEIGHT) && !predictor.has_height() {
+        "the logs have no height: baro.altitude_m or gnss.position_ned_m"
     } else {
         "these logs show what lasts alone"
     }

@@ -239,16 +239,18 @@ pub(crate) enum Moments {
 /// Leaves out what is not known of some flights: drag without the motion through the air, and
 /// moments that have nothing to do with those of the vehicle file.
 pub(crate) fn leave_out(predictor: &mut Predictor<'_>, residual: &[f64], moments: Moments) {
+    let lasting = moments == Moments::Lasting;
     // A heading that is taken as held does for what lasts.
-    let has_motion =
-        predictor.has_motion() && (predictor.has_heading() || moments == Moments::Lasting);
-    if !has_motion {
+    let has_heading = predictor.has_heading() || lasting;
+    if !predictor.has_motion() || !has_heading {
         predictor.leave_out_drag();
-        predictor.leave_out_moments();
-    } else if moments == Moments::Lasting {
+    }
+    let are_known = || predictor.has_motion() && moments_fit(predictor, residual);
+    if lasting {
         predictor.keep_trim();
-    } else if !predictor.has_pitch()
-        || (moments == Moments::IfKnown && !moments_fit(predictor, residual))
+    } else if !has_heading
+        || !predictor.has_pitch()
+        || (moments == Moments::IfKnown && !are_known())
     {
         // What turned a vehicle is not known where its pitch is what its force would have it be.
         predictor.leave_out_moments();

@@ -8,3 +8,4 @@ pub(crate) mod inertial;
 pub(crate) mod recording;
 pub(crate) mod series;
 pub(crate) mod smoother;
+mod wings;

@@ -5,6 +5,7 @@ use super::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass};
 use super::ground;
 use super::inertial::{self, ATTITUDE, Common, Derived, Inertial, ROTOR_SPEED, Sources, VELOCITY};
 use super::series::{Series, Span, common};
+use super::wings;
 use crate::GapError;
 use nalgebra::{Quaternion, Vector3};
 use squirrel_core::dynamics::State;
@@ -127,7 +128,7 @@ impl<'a> Recording<'a> {
         for (channel, series) in [(ATTITUDE, &attitude), (VELOCITY, &velocity)] {
             if series.is_none() {
                 notes.push(format!(
-                    "{flight}: {channel}: missing; drag and wings are those of zero velocity over ground"
+                    "{flight}: {channel}: missing; drag is that of zero velocity over ground"
                 ));
             }
         }
@@ -199,7 +200,23 @@ impl<'a> Recording<'a> {
                 recording.usable_with(&recording.pieces, "time off the ground", &free)?;
             recording.notes.push(ground::note(flight, &touches));
         }
+        recording.leave_out_open_wings()?;
         Ok(recording)
+    }
+
+    /// Leaves out what cannot be predicted.
+    fn leave_out_open_wings(&mut self) -> Result<(), GapError> {
+        let open = self.wing.as_ref().map(wings::open).unwrap_or_default();
+        if open.is_empty() || self.attitude.is_some() && self.velocity.is_some() {
+            return Ok(());
+        }
+        let folded = ground::outside(&open);
+        self.pieces = self.usable_with(&self.pieces, "time with folded wings", &folded)?;
+        self.notes.push(format!(
+            "{}: time with open wings is left out: what they do depends on attitude and velocity",
+            self.flight
+        ));
+        Ok(())
     }
 
     /// The spans in which every channel exists, without those that the filter eats.

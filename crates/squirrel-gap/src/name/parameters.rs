@@ -120,6 +120,7 @@ impl Catalogue {
             (!predictor.has_all_of(2) && !shown.has(Shown::LASTING))
                 || (shown.has(Shown::MOMENTS) && !predictor.has_channel(3))
                 || (shown.has(Shown::HORIZONTAL) && !predictor.has_channel(0))
+                || (shown.has(Shown::HEIGHT) && !predictor.has_height())
                 || (shown.has(Shown::COMMANDS) && predictor.has_rotor_speeds())
         };
         let mut all = Self {

@@ -126,7 +126,12 @@ fn missing(verdict: &Verdict, vehicle: &VehicleFile) -> Answer {
         Kind::NotIdentifiable if effects.is_empty() => {
             let what =
                 verdict.words.split_once(". ").map_or(verdict.words.as_str(), |(first, _)| first);
-            said("Nothing seen, but these flights could not show everything", vec![full_stop(what)])
+            let title = if verdict.is_unseen() {
+                "Something, in flights that cannot show what"
+            } else {
+                "Nothing seen, but these flights could not show everything"
+            };
+            said(title, vec![full_stop(what)])
         }
         Kind::NotIdentifiable => {
             lines.extend(others);

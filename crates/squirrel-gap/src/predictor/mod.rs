@@ -238,10 +238,14 @@ impl<'a> Predictor<'a> {
     /// Leaves the moments out of everything that follows.
     pub(crate) fn leave_out_moments(&mut self) {
         self.segments.retain(|s| !(3..DYNAMIC).contains(&s.channel));
-        let why = if self.has_pitch() {
-            "the vehicle file explains next to nothing of the measured ones"
-        } else {
+        let why = if !self.has_pitch() {
             "pitch was not measured"
+        } else if !self.has_heading() {
+            "the heading was not measured"
+        } else if !self.has_motion() {
+            "air at an unknown velocity may turn the vehicle"
+        } else {
+            "the vehicle file explains next to nothing of the measured ones"
         };
         self.notes.push(format!("moments: {why}; effects are named from forces alone"));
     }

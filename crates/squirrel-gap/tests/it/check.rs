@@ -158,14 +158,30 @@ fn slow_commands_show_no_lag() {
     }
 }
 
-/// Without velocity nobody knows what spread wings do: no name is sure.
+/// Without velocity nobody knows what the air does, above all to spread wings; that rotors lag is
+/// seen while they are folded.
 #[test]
-fn wings_in_unknown_air_hide_every_name() {
+fn what_needs_velocity_or_height_lacks_it() {
     let (name, mut log) = fly_rich(&VehicleFile::squirrel(), 1);
-    log.sources.remove("gnss");
+    for source in ["gnss", "baro"] {
+        log.sources.remove(source);
+    }
+    log.source_mut("rotor").channels.remove("speed_rad_s");
     let found = looked(&[(name, log)]);
-    assert!(found.effects.iter().all(|effect| effect.shown == Shows::Cannot), "{}", found.words);
-    assert!(effect(&found, "motor_lag").lacks.as_ref().unwrap().contains("gnss.velocity_ned_m_s"));
+    assert_eq!(effect(&found, "motor_lag").shown, Shows::Can, "{}", found.words);
+    for name in ["rotor_wash", "wing_membrane", "wing_servo_lag"] {
+        assert_eq!(effect(&found, name).shown, Shows::Cannot, "{name}");
+    }
+    for (name, what) in [
+        ("linear_drag", "velocity, attitude and heading"),
+        ("constant_wind", "velocity, attitude and heading"),
+        ("wing_tangential", "velocity, attitude and heading"),
+        ("ground_effect", "no height"),
+    ] {
+        let effect = effect(&found, name);
+        assert_eq!(effect.shown, Shows::Cannot, "{name}");
+        assert!(effect.lacks.as_ref().unwrap().contains(what), "{name}: {:?}", effect.lacks);
+    }
 }
 
 #[test]

@@ -152,7 +152,7 @@ fn what_the_log_lacks_is_noted() {
         assert_eq!(notes.len(), 1, "{notes:?}");
         notes.into_iter().next().unwrap()
     };
-    let still = "missing; drag and wings are those of zero velocity over ground";
+    let still = "missing; drag is that of zero velocity over ground";
     assert_eq!(note("gnss", "velocity_ned_m_s"), format!("f: gnss.velocity_ned_m_s: {still}"));
     assert_eq!(
         note("attitude", "q_ned_from_body_wxyz"),

@@ -19,6 +19,7 @@ mod held_out;
 mod long_flights;
 mod nanobench;
 mod no_imu;
+mod no_velocity;
 mod real_flights;
 mod real_models;
 mod report;
