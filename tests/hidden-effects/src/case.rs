@@ -180,6 +180,7 @@ impl Case {
             Set::Estimates => answer.recorder = Recorder::Estimator(Estimator::draw(&mut draw)),
             Set::Capture => answer.recorder = Recorder::Capture(Capture::draw(&mut draw)),
             Set::Misfit => answer.misfit = Some(Misfit::draw(&mut draw)),
+            Set::Inertial => answer.poor = Some(Poor::inertial()),
             Set::Poor => {
                 let poor = Poor::draw(index, &mut draw);
                 answer.excitation = poor.excitation;
@@ -466,7 +467,7 @@ mod tests {
     fn new_sets_hide_what_they_say() {
         for index in 0..60 {
             let hidden = |set| Case::draw(set, index, 1).answer;
-            for set in [Set::Estimates, Set::Capture, Set::Baseline] {
+            for set in [Set::Estimates, Set::Capture, Set::Baseline, Set::Inertial] {
                 let answer = hidden(set);
                 assert_eq!(answer.effects.len(), 1 - index % 2, "{set:?}");
                 assert_eq!(answer.group().ends_with("_none"), index % 2 == 1);

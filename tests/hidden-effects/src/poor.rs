@@ -18,6 +18,8 @@ pub struct Poor {
 
 /// Length of a flight that is cut off, s.
 const SHORT_S: [f64; 2] = [6.0, 15.0];
+/// Longer than any flight, s.
+const WHOLE_S: f64 = 1e3;
 /// Sources that a log without fixes lacks.
 const FIXES: [&str; 2] = ["gnss", "baro"];
 
@@ -28,9 +30,14 @@ impl Poor {
         let (excitation, seconds, has_fixes) = match (index + index / 33) % 3 {
             0 => (Excitation::Rich, seconds, true),
             1 => (Excitation::Calm, 2.0 * seconds, true),
-            _ => (Excitation::Rich, f64::INFINITY, false),
+            _ => return Self::inertial(),
         };
-        Self { excitation, seconds: seconds.min(1e3), has_fixes }
+        Self { excitation, seconds, has_fixes }
+    }
+
+    /// Whole flights without fixes.
+    pub fn inertial() -> Self {
+        Self { excitation: Excitation::Rich, seconds: WHOLE_S, has_fixes: false }
     }
 
     /// What is left of a log.

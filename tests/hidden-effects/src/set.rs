@@ -41,11 +41,13 @@ pub enum Set {
     Baseline,
     /// One effect in poor flights: short, short and calm, or without fixes.
     Poor,
+    /// No velocity, position or height: one effect that inertial unit and commands show, or nothing.
+    Inertial,
 }
 
 impl Set {
     /// All sets with the number of cases of a full run.
-    pub const ALL: [(Self, usize); 16] = [
+    pub const ALL: [(Self, usize); 17] = [
         (Self::Single, 290),
         (Self::Two, 200),
         (Self::None, 300),
@@ -62,6 +64,7 @@ impl Set {
         (Self::Misfit, 105),
         (Self::Baseline, 116),
         (Self::Poor, 66),
+        (Self::Inertial, 132),
     ];
 
     /// Name as on the command line and in files.
@@ -83,6 +86,7 @@ impl Set {
             Self::Misfit => "misfit",
             Self::Baseline => "baseline",
             Self::Poor => "poor",
+            Self::Inertial => "inertial",
         }
     }
 
@@ -92,6 +96,7 @@ impl Set {
             Self::Estimates if hides_nothing => "estimates_none",
             Self::Capture if hides_nothing => "capture_none",
             Self::Baseline if hides_nothing => "baseline_none",
+            Self::Inertial if hides_nothing => "inertial_none",
             _ => self.name(),
         }
     }
@@ -103,7 +108,7 @@ impl Set {
 
     /// Whether every other case of it hides nothing.
     pub fn is_half(self) -> bool {
-        matches!(self, Self::Estimates | Self::Capture | Self::Baseline)
+        matches!(self, Self::Estimates | Self::Capture | Self::Baseline | Self::Inertial)
     }
 
     pub(crate) fn excitation(self) -> Excitation {
@@ -130,6 +135,7 @@ impl Set {
         };
         match self {
             Self::Capture => of(&CAPTURED),
+            Self::Inertial => of(&FELT),
             Self::Misfit => of(&BESIDE_MISFIT),
             // Gusts have no size that a file could state too large: what blows on one day is not
             // what blows on another.
@@ -162,6 +168,23 @@ pub const CAPTURED: [&str; 15] = [
     "wing_membrane",
     "wing_asymmetry",
     "payload_swing",
+];
+
+/// What forces along the thrust axis, rates and commands show at whatever velocity: thrust, weight,
+/// what lies between commands and rotors, and what turns the vehicle. Not on it: what the air does
+/// at a velocity that nobody knows.
+pub const FELT: [&str; 11] = [
+    "battery_sag",
+    "thrust_coefficient",
+    "motor_lag",
+    "weak_rotor",
+    "mass_error",
+    "inertia_error",
+    "cg_offset",
+    "yaw_torque_coeff",
+    "rotor_gyro_torque",
+    "actuation_latency",
+    "clock_skew",
 ];
 
 /// Forces and moments that follow from motion and commands. Not on it: gusts, which are an
@@ -231,6 +254,7 @@ mod tests {
     fn lists_name_effects_of_the_catalogue_and_groups_are_told_apart() {
         assert_eq!(Set::Capture.effects().len(), CAPTURED.len());
         assert_eq!(Set::Misfit.effects().len(), BESIDE_MISFIT.len());
+        assert_eq!(Set::Inertial.effects().len(), FELT.len());
         assert_eq!(Set::Overstated.effects().len(), CATALOGUE.len() - 1);
         assert_eq!(Set::Estimates.group(true), "estimates_none");
         assert_eq!((Set::None.group(true), Set::Baseline.group(false)), ("none", "baseline"));
@@ -240,7 +264,14 @@ mod tests {
     /// Each generator flies each effect of a set that both fly.
     #[test]
     fn generators_share_the_effects() {
-        for set in [Set::Single, Set::Estimates, Set::Capture, Set::Overstated, Set::Baseline] {
+        for set in [
+            Set::Single,
+            Set::Estimates,
+            Set::Capture,
+            Set::Overstated,
+            Set::Baseline,
+            Set::Inertial,
+        ] {
             let effects = set.effects().len();
             let step = if set.is_half() { 2 } else { 1 };
             let flown: BTreeSet<_> =

@@ -33,7 +33,7 @@ const GAP: (&str, Figure) = ("gap removed, median", |g| g.gap_removed_median);
 const REMOVABLE: (&str, Figure) = ("removable removed, median", |g| g.removable_removed_median);
 
 /// Set, figure, bar; a share of silent errors is one that must not be above it.
-const BARS: [(&str, (&str, Figure), f64); 18] = [
+const BARS: [(&str, (&str, Figure), f64); 20] = [
     ("single", FIRST, 0.99),
     ("single", EXACT, 0.985),
     ("single", GAP, 0.999),
@@ -46,6 +46,8 @@ const BARS: [(&str, (&str, Figure), f64); 18] = [
     ("sensors", RIGHT, 0.97),
     ("capture", FIRST, 0.9),
     ("capture_none", RIGHT, 0.98),
+    ("inertial", FIRST, 0.9),
+    ("inertial_none", RIGHT, 0.98),
     ("overstated", RIGHT, 0.97),
     ("misfit", FIRST, 0.95),
     ("misfit", PATCH, 0.9),

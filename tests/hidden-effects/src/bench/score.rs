@@ -126,7 +126,10 @@ pub(super) fn score(answer: &Answer, asked: Asked) -> Outcome {
     outcome.flagged = open || rightly_ambiguous;
     if truth.is_empty() {
         let right = if answer.hides_nothing() { Word::None } else { Word::OutsideCatalogue };
-        (outcome.first_right, outcome.exact) = (word == right, word == right);
+        // Where nobody knows the velocity, nothing is seen and not everything could be.
+        let unseen = answer.set == Set::Inertial && word == Word::NotIdentifiable;
+        let is_right = word == right || (unseen && verdict.names().is_empty());
+        (outcome.first_right, outcome.exact) = (is_right, is_right);
     } else {
         let names = names_surely || word == Word::Ambiguous;
         outcome.first_right = names && verdict.first().is_some_and(|name| truth.contains(name));
@@ -319,6 +322,10 @@ mod tests {
     /// first name counts.
     #[test]
     fn other_sets_against_those_who_always_say_the_same() {
+        let unseen = said("not_identifiable", &[], &[]);
+        assert!(right(Set::Inertial, 1, &unseen) && !right(Set::Estimates, 1, &unseen));
+        assert!(!right(Set::Inertial, 0, &unseen));
+        assert!(right(Set::Inertial, 0, &said("named_incomplete", &["battery_sag"], &[])));
         for set in [Set::Estimates, Set::Capture, Set::Baseline] {
             assert!(
                 !right(set, 0, &said("none", &[], &[])) && right(set, 1, &said("none", &[], &[]))

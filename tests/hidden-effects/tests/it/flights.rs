@@ -122,6 +122,7 @@ fn the_same_seed_makes_the_same_bytes_in_every_new_set() {
         Set::Misfit,
         Set::Baseline,
         Set::Outside,
+        Set::Inertial,
     ] {
         for folder in [&first, &second] {
             let (case, made) = Case::draw_and_make(set, 1, 7, folder).unwrap();
