@@ -142,22 +142,17 @@ fn sorted<'a>(
         return judged(&own.vehicle, baseline, flights, held_out, ready, own.moments, progress);
     }
     let plain = |ready| judged(vehicle, None, flights, held_out, ready, Moments::IfKnown, progress);
-    // With all moments beside the answer without them.
-    let gyroscope = ready.gyroscope();
-    let is_blown = !ready.predictor.has_motion();
-    let wants_both = match gyroscope {
-        Gyroscope::Missing => false,
-        Gyroscope::Follows => is_blown,
-        Gyroscope::Strays => !is_blown,
-    };
-    if !wants_both {
+    // In two kinds of flights the answer with all moments stands beside the one without them.
+    let is_blown = ready.turns_in_unknown_air();
+    let strays = ready.predictor.has_motion() && ready.gyroscope() == Gyroscope::Strays;
+    if !is_blown && !strays {
         return plain(ready);
     }
     let again = Ready::new(vehicle, flights, held_out)?;
     let whole = judged(vehicle, None, flights, held_out, again, Moments::All, progress)?;
     // Moments that stray count where what lasts explains all of them; else they would be read into
     // whatever name takes most of it, or noise of the gyroscope into a lag.
-    if !is_blown && lasting(&whole.verdict) && whole.verdict.verdict == Kind::Named {
+    if strays && lasting(&whole.verdict) && whole.verdict.verdict == Kind::Named {
         return Ok(whole);
     }
     let plain = plain(ready)?;

@@ -114,6 +114,7 @@ impl Seen<'_> {
         let (ready, moments) = match self.own {
             // As a diagnosis does: the data are the file's matter, sizes are the machine's.
             Some(own) => (Ready::new(&own.vehicle, flights, held_out)?, own.moments),
+            None if ready.turns_in_unknown_air() => (ready, Moments::All),
             None => (ready, Moments::IfKnown),
         };
         let ready = ready.narrowed(flights, moments)?;

@@ -72,6 +72,12 @@ impl<'a> Ready<'a> {
         Ok(self)
     }
 
+    /// Whether moments go with the file's although nobody knows how the air moves past the vehicle,
+    /// which may turn it, too.
+    pub(crate) fn turns_in_unknown_air(&self) -> bool {
+        !self.predictor.has_motion() && self.gyroscope() == Gyroscope::Follows
+    }
+
     /// What the moments that a gyroscope gives have to do with the file's.
     pub(crate) fn gyroscope(&self) -> Gyroscope {
         if !self.predictor.has_gyroscope() {
