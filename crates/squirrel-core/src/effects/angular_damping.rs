@@ -33,7 +33,8 @@ impl<T: Real> Effect<T> for AngularDamping<T> {
         less: "Air damps rotation less",
         fly: "a multisine from 0.3 to 6 Hz in roll and pitch",
     };
-    const SHOWN: Shown = Shown::MOMENTS;
+    // Drag and inflow of the rotors damp turning as well, and only a velocity tells them from it.
+    const SHOWN: Shown = Shown::MOMENTS.and(Shown::HORIZONTAL);
     const IS_OF_MOMENTS: bool = true;
 }
 
