@@ -77,7 +77,7 @@ impl Baseline {
         let (set_aside, moments) = match Ready::new(vehicle, flights, &[]) {
             Ok(ready) => {
                 let is_known = ready.gyroscope() == Gyroscope::Follows;
-                let moments = if is_known { Moments::IfKnown } else { Moments::Lasting };
+                let moments = if is_known { Moments::All } else { Moments::Lasting };
                 (compatibility::problems(&ready, flights, &[])?, moments)
             }
             Err(error) => {
