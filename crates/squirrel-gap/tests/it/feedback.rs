@@ -8,7 +8,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::In;
 use squirrel_core::math::GRAVITY_M_S2;
-use squirrel_gap::{Kind, Value, Verdict, contradictions, diagnose};
+use squirrel_gap::{Baseline, Kind, Value, Verdict, contradictions, diagnose, diagnose_since};
 use squirrel_log::FlightLog;
 use squirrel_sim::plant::Plant;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -125,6 +125,23 @@ fn a_weak_rotor_is_named_from_a_calm_flight_through_a_noisy_gyroscope() {
     let verdict = verdict(&with_weak_rotor(0.12), how);
     let names: Vec<_> = verdict.effects.iter().map(|effect| effect.name).collect();
     assert_eq!((verdict.verdict, names), (Kind::Named, vec!["weak_rotor"]), "{}", verdict.words);
+}
+
+/// What a weak rotor does hides that the moments of this machine are known, as its good flights show.
+#[test]
+fn what_good_flights_show_of_moments_holds_for_a_machine_that_has_changed() {
+    let how = Flown { gyro_rad_s: 0.003, heave: 0.3, hold: 0.2 };
+    let fly = |machine: &VehicleFile, seeds: [u64; 2]| seeds.map(|seed| flight(machine, seed, how));
+    let own = vehicle(FILE);
+    let good = Baseline::fit(&own, &fly(&own, [1, 2]), &|_| ()).unwrap();
+    let since = |machine: &VehicleFile| {
+        let verdict = diagnose_since(&good, &fly(machine, [3, 4]), &[], &|_| ()).unwrap().verdict;
+        println!("{}", verdict.words);
+        verdict.effects.iter().map(|effect| effect.name).collect::<Vec<_>>()
+    };
+    // Was the thrust of all rotors, or the mass.
+    assert_eq!(since(&with_weak_rotor(0.2)), ["weak_rotor"]);
+    assert!(since(&own).is_empty());
 }
 
 /// A chipped propeller gives less thrust and takes as much torque: the yaw moment that a slower one
