@@ -35,7 +35,7 @@ pub(super) fn explain_wherever(
     // Asked for once, beside other candidates, it stays free.
     let is_free =
         catalogue.airframe.iter().any(|(number, _)| matches!(number, Airframe::DragCentre { .. }));
-    let could_ask = has_moments && predictor.has_channel(0) && !catalogue.is_of_one_machine;
+    let could_ask = has_moments && predictor.has_channel(0);
     if is_free || !could_ask {
         return Ok(naming);
     }
