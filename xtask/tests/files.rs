@@ -12,7 +12,7 @@ const PAST_IT: [&str; 9] = [
     "File::create",
     "File::open",
     "File::options",
-    "OpenOptions",
+    "OpenOptions::new",
     "fs::write",
     "fs::read(",
     "fs::read_to_string",
