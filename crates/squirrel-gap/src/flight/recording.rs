@@ -204,7 +204,7 @@ impl<'a> Recording<'a> {
         Ok(recording)
     }
 
-    /// Leaves out what cannot be predicted.
+    /// Leaves out time in which nobody knows what blows on open wings.
     fn leave_out_open_wings(&mut self) -> Result<(), GapError> {
         let open = self.wing.as_ref().map(wings::open).unwrap_or_default();
         if open.is_empty() || self.attitude.is_some() && self.velocity.is_some() {

@@ -77,6 +77,7 @@ impl Hdf5 {
             root: &root,
             referred: None,
             seen: BTreeSet::new(),
+            looked_at: 0,
             budget,
         };
         finder.group(&root, "", 0)?;
@@ -99,6 +100,8 @@ struct Finder<'a> {
     referred: Option<BTreeMap<u64, Referred>>,
     /// Groups that have been gone through: links may lead round in a circle.
     seen: BTreeSet<u64>,
+    /// Datasets that have been looked at: so may references.
+    looked_at: usize,
     budget: &'a mut Budget,
 }
 
@@ -126,6 +129,10 @@ impl Finder<'_> {
     }
 
     fn dataset(&mut self, dataset: &Dataset, path: &str, depth: usize) -> Result<(), String> {
+        self.looked_at += 1;
+        if self.looked_at > ARRAYS_MAX {
+            return Err(format!("more than {ARRAYS_MAX} datasets"));
+        }
         let class = dataset.attribute(CLASS).ok().map(|class| class.read_string());
         let class = class.transpose().map_err(said)?;
         if dataset.attribute(EMPTY).is_ok() {
@@ -161,6 +168,7 @@ impl Finder<'_> {
 
     /// Adds an array of the dataset that is added next.
     fn array(&mut self, dataset: &Dataset, path: String, numbers: Numbers) -> Result<(), String> {
+        // Of records, each field is one.
         if self.found.all.len() == ARRAYS_MAX {
             return Err(format!("more than {ARRAYS_MAX} arrays"));
         }

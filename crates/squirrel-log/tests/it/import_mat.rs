@@ -133,6 +133,8 @@ fn a_mat_file_that_says_something_else_is_one_line() {
     later.resize(512, 0);
     for (bytes, problem) in [
         (later, "f.mat: invalid HDF5 magic bytes"),
+        // Each of two references to itself is followed to two again.
+        (std::fs::read(data("mat/round.mat")).unwrap(), "f.mat: more than 50000 datasets"),
         (plain[..100].to_vec(), "f.mat: ends inside the header, after 100 bytes"),
         (vec![0; 200], "f.mat: no MAT-file of level 5; in MATLAB, `save -v7` writes one"),
         (

@@ -21,3 +21,12 @@ with h5py.File(file, "a") as written:
     sparse.attrs["MATLAB_sparse"] = np.uint64(3)
     sparse.attrs["MATLAB_class"] = np.bytes_("double")
     sparse["data"], sparse["ir"], sparse["jc"] = np.ones(2), np.arange(2), np.arange(4)
+
+# References that lead round in a circle, twice at each turn.
+with h5py.File(HERE / "round.mat", "w", userblock_size=512) as written:
+    refs = written.create_group("#refs#")
+    both = refs.create_dataset("a", (2,), dtype=h5py.ref_dtype)
+    both[:] = [both.ref, both.ref]
+    written.create_dataset("list/field", data=[both.ref, both.ref], dtype=h5py.ref_dtype)
+with open(HERE / "round.mat", "r+b") as written:
+    written.write(b"MATLAB 7.3 MAT-file")
