@@ -8,10 +8,11 @@ use repository::{crates, product, products, root};
 use std::fs;
 
 /// What opens, makes or replaces a file past that place.
-const PAST_IT: [&str; 9] = [
+const PAST_IT: [&str; 10] = [
     "File::create",
     "File::open",
     "File::options",
+    "fs::OpenOptions",
     "OpenOptions::new",
     "fs::write",
     "fs::read(",

@@ -49,9 +49,7 @@ impl Arrays for Hdf5 {
     fn bytes(&mut self, index: usize, budget: &mut Budget) -> Result<&[u8], String> {
         let (dataset, read) = &mut self.datasets[self.places[index]];
         if read.is_none() {
-            let size = dataset.raw_byte_len().map_err(said)?;
-            budget.take(size as u64).map_err(said)?;
-            *read = Some(dataset.read_raw_bytes().map_err(unread)?);
+            *read = Some(bytes_of(dataset, budget)?);
         }
         Ok(read.as_deref().unwrap_or_default())
     }
@@ -183,9 +181,7 @@ impl Finder<'_> {
     /// Adds what the elements of a list of structures hold in one field: `log.imu[0].gyro` of
     /// `log.imu.gyro`.
     fn elements(&mut self, field: &Dataset, path: &str, depth: usize) -> Result<(), String> {
-        let size = field.raw_byte_len().map_err(said)?;
-        self.budget.take(size as u64).map_err(said)?;
-        let bytes = field.read_raw_bytes().map_err(unread)?;
+        let bytes = bytes_of(field, self.budget)?;
         let addresses = read_object_references(&bytes, self.offset_size).map_err(said)?;
         let (list, name) = path.rsplit_once('.').unwrap_or(("", path));
         for (index, address) in addresses.into_iter().enumerate() {
@@ -223,6 +219,13 @@ impl Finder<'_> {
         }
         Ok(self.referred.get_or_insert_default())
     }
+}
+
+/// All bytes of a dataset, taken from the budget.
+fn bytes_of(dataset: &Dataset, budget: &mut Budget) -> Result<Vec<u8>, String> {
+    let size = dataset.raw_byte_len().map_err(said)?;
+    budget.take(size as u64).map_err(said)?;
+    dataset.read_raw_bytes().map_err(unread)
 }
 
 fn inside(path: &str, name: &str) -> String {

@@ -42,6 +42,12 @@ fn compare(flight: &Flight, map: &str, file: &str, columns: &[&str], csv: &str) 
     time_s.len() * columns.len()
 }
 
+/// A file is refused with one line that begins with the problem.
+fn refuses(flight: &Flight, map: &str, file: &str, problem: &str) {
+    let message = flight.message(&flight.import(map, &[file]).unwrap_err());
+    assert!(message.starts_with(problem) && message.lines().count() == 1, "{message}");
+}
+
 #[test]
 fn every_number_of_a_mat_file_is_what_scipy_reads() {
     for (name, read) in
@@ -93,9 +99,7 @@ fn what_an_hdf5_file_does_not_give_is_one_line() {
         ("t", "endless", "f.h5: `endless` has 1000000000 samples, its time `t` has 40"),
         ("endless", "endless", "f.h5: its content is larger than 256 MB"),
     ] {
-        let error = flight.import(&map("", time, &[column]), &["f.h5"]).unwrap_err();
-        let message = flight.message(&error);
-        assert!(message.starts_with(problem) && message.lines().count() == 1, "{message}");
+        refuses(&flight, &map("", time, &[column]), "f.h5", problem);
     }
     flight.write("f.h5", &whole[..whole.len() / 2]);
     let error = flight.import(&map("", "t", &["imu.gyro[0]"]), &["f.h5"]).unwrap_err();
@@ -125,9 +129,7 @@ fn a_mat_file_that_says_something_else_is_one_line() {
             "f.mat, column `gyro[1]`, row 2: time repeats: -0.2 after -0.2 in row 1",
         ),
     ] {
-        let error = flight.import(&map("", time, &[column]), &["f.mat"]).unwrap_err();
-        let message = flight.message(&error);
-        assert!(message.starts_with(problem) && message.lines().count() == 1, "{message}");
+        refuses(&flight, &map("", time, &[column]), "f.mat", problem);
     }
     let mut later = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".to_vec();
     later.resize(512, 0);
@@ -143,9 +145,7 @@ fn a_mat_file_that_says_something_else_is_one_line() {
         ),
     ] {
         flight.write("f.mat", &bytes);
-        let error = flight.import(&map("", "t", &["gyro[0]"]), &["f.mat"]).unwrap_err();
-        let message = flight.message(&error);
-        assert!(message.starts_with(problem) && message.lines().count() == 1, "{message}");
+        refuses(&flight, &map("", "t", &["gyro[0]"]), "f.mat", problem);
     }
 }
 
