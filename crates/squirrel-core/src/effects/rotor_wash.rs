@@ -182,7 +182,8 @@ impl<L: Lane> Acts<L> for Numbers<L> {
     #[inline(always)]
     fn wrench(&self, at: &Situation<'_, L>, forms: Forms) -> BodyWrench<L> {
         let mut sum = BodyWrench { force: [absent(); 3], moment: [absent(); 3] };
-        if forms.has(JETS) {
+        // Jets cost more than all other effects together.
+        if forms.has(JETS) && at.deployment[0].upper(at.deployment[1]).any_positive() {
             // Of the plate's own air, over its area.
             let mut own = at.wings.normal_forces(at.flow, &[L::of(1.0); 2]);
             own = [own[0] * self.per_area, own[1] * self.per_area];

@@ -1,5 +1,5 @@
-//! Two hundred random avoidance tasks: how many are solved, how much work it is, and that what is
-//! planned is a motion that the vehicle can make.
+//! Random avoidance tasks: how many are solved, how much work it is, and that what is planned is a
+//! motion that the vehicle can make.
 
 use super::tasks::{Draw, craft, random};
 use nalgebra::Vector3;
@@ -76,11 +76,12 @@ fn middle_and_most(mut counts: Vec<u32>) -> (u32, u32) {
 /// wings, 13 or 14 and 177 to 189 without.
 #[test]
 fn ninety_five_of_a_hundred_are_solved_within_a_bounded_number_of_iterations() {
-    for ratio in [1.2, 1.5, 2.0] {
+    // Most where thrust is scarce: that is where plans are hard.
+    for (ratio, tasks) in [(1.2, 200), (1.5, 60), (2.0, 60)] {
         for wing in [Some(WingModel::Flat), None] {
             let (craft, mut draw) = (craft(ratio, wing), Draw(1));
             let (mut problems, mut iterations, mut solved) = (Vec::new(), Vec::new(), 0);
-            for _ in 0..200 {
+            for _ in 0..tasks {
                 let task = random(&craft, &mut draw);
                 let plan = Planner::default().plan(&craft, &task, None);
                 problems.push(plan.iterations);
@@ -92,9 +93,9 @@ fn ninety_five_of_a_hundred_are_solved_within_a_bounded_number_of_iterations() {
             }
             let (problems, iterations) = (middle_and_most(problems), middle_and_most(iterations));
             println!(
-                "T/W {ratio}, wings {wing:?}: {solved} of 200 solved; {problems:?} problems, {iterations:?} iterations, middle and most"
+                "T/W {ratio}, wings {wing:?}: {solved} of {tasks} solved; {problems:?} problems, {iterations:?} iterations, middle and most"
             );
-            assert!(solved >= 190, "{solved} of 200 at {ratio}");
+            assert!(100 * solved >= 95 * tasks, "{solved} of {tasks} at {ratio}");
             // Half as much again as was measured: room for another target's rounding, none for
             // twice the work.
             let most = if wing.is_some() { (33, 480) } else { (21, 280) };

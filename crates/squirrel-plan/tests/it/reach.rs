@@ -46,7 +46,7 @@ fn a_flat_wing_reaches_what_dense_sampling_finds() {
 #[test]
 fn a_membrane_reaches_what_dense_sampling_finds() {
     let wing = WingForce::of(&VehicleFile::squirrel(), WingModel::Membrane).unwrap();
-    let [gap, bound] = gaps(&wing, 500, 30, 12, 2);
+    let [gap, bound] = gaps(&wing, 200, 30, 12, 2);
     assert!(gap <= 1e-3 && bound <= 1e-3, "{gap:.1e} {bound:.1e}");
 }
 
