@@ -6,16 +6,11 @@ or in wind, or with a battery that sags; two flights are diagnosed, a third is h
     python compare.py --squirrel target/release/squirrel --seed 1 --json plants.json
 """
 
-import argparse
 import copy
 import importlib
-import json
-import re
-import subprocess
-import tempfile
-from pathlib import Path
 
 import numpy as np
+from common import AIR_KG_M3, Lost, asked, bench, vehicle_file
 from rotorpy.controllers.quadrotor_control import SE3Control
 from rotorpy.trajectories.circular_traj import ThreeDCircularTraj
 from rotorpy.trajectories.lissajous_traj import TwoDLissajous
@@ -28,8 +23,6 @@ FLIGHT_S = 32.0
 # The log begins in flight: what a plant does from a standing start is not what is asked.
 LOG_FROM_S = 2.0
 GRAVITY_M_S2 = 9.81
-AIR_KG_M3 = 1.225
-FRD = np.array([1.0, -1.0, -1.0])
 KINDS = ("minsnap", "lissajous", "circle")
 
 # Half the width of the space flown in, m, speed, m/s, and how firmly attitude is held, 1/s^2 and 1/s. The rotors are slower than
@@ -75,42 +68,20 @@ def hover_rad_s(params):
     return float(np.sqrt(params["mass"] * GRAVITY_M_S2 / 4 / params["k_eta"]))
 
 
-def vehicle_file(squirrel, name, params, path):
-    """A first file of the program with RotorPy's numbers, each with the tolerance of a careful bench."""
-    new = ["vehicle", "new", "--frame", "quad-x", "--mass-kg", str(params["mass"]), "--propeller-inch", "5", "--name", "plant", "--out", str(path)]
-    subprocess.run([squirrel, *new], check=True, capture_output=True)
-    head, rest = path.read_text().split("[[rotor]]", 1)
-    arm = float(np.linalg.norm(params["rotor_pos"]["r1"]))
-    rotors = ""
-    for place, turns in zip(params["rotor_pos"].values(), params["rotor_directions"]):
-        position = [float(x) for x in place * FRD + 0.0]
-        rotors += f'[[rotor]]\nposition_body_m = {{ value = {position}, sd = {[0.003 * arm] * 3}, source = "RotorPy" }}\nyaw_sign = {-int(turns)}\n\n'
-    text = head + rotors + rest[rest.index("[propulsion]") :]
-
-    def put(key, value, sd=None):
-        nonlocal text
-        spread = "" if sd is None else f", sd = {sd}"
-        text, found = re.subn(rf"^{key} = .*$", f'{key} = {{ value = {value}{spread}, source = "RotorPy" }}', text, flags=re.MULTILINE)
-        assert found == 1, key
-
-    def close(key, value, share):
-        put(key, value, share * value)
-
-    inertia = [params[key] for key in ("Ixx", "Iyy", "Izz")]
-    close("mass_kg", params["mass"], 0.003)
-    put("inertia_kg_m2", inertia, [0.02 * x for x in inertia])
-    close("speed_max_rad_s", float(params["rotor_speed_max"]), 0.002)
-    close("thrust_coefficient_n_s2", params["k_eta"], 0.008)
-    close("torque_coefficient_n_m_s2", params["k_m"], 0.02)
-    close("time_constant_s", params["tau_m"], 0.05)
-    put("propeller_diameter_m", DIAMETER_M[name], 0.001)
-    put("linear_n_s_per_m", [0.0] * 3, [0.02 * params["mass"]] * 3)
-    close("area_m2", 2 * params["c_Dx"] / AIR_KG_M3, 0.1)
-    put("reference_voltage_v", 3.7 * CELLS[name], 0.1)
-    text = re.sub(r"^cells = .*$", f"cells = {CELLS[name]}", text, flags=re.MULTILINE)
-    put("thrust_max_n", 4 * params["k_eta"] * params["rotor_speed_max"] ** 2)
-    put("thrust_min_n", 0.1 * params["mass"] * GRAVITY_M_S2)
-    path.write_text(text)
+def numbers(name, params):
+    """RotorPy's numbers, as a vehicle file has them."""
+    return {
+        "mass": params["mass"],
+        "inertia": [params[key] for key in ("Ixx", "Iyy", "Izz")],
+        "rotors": list(zip(params["rotor_pos"].values(), params["rotor_directions"])),
+        "top": params["rotor_speed_max"],
+        "thrust": params["k_eta"],
+        "torque": params["k_m"],
+        "lag": params["tau_m"],
+        "diameter": DIAMETER_M[name],
+        "area": 2 * params["c_Dx"] / AIR_KG_M3,
+        "cells": CELLS[name],
+    }
 
 
 def hide(effect, params, speed, rng):
@@ -160,10 +131,6 @@ def hide(effect, params, speed, rng):
         case "battery":
             more["exponent"] = rng.uniform(0.4, 0.8)
     return params, more
-
-
-class Lost(Exception):
-    """RotorPy's controller does not hold the machine with what was hidden."""
 
 
 class Plant(Multirotor):
@@ -230,20 +197,6 @@ def trajectory(kind, size, speed, rng):
     return MinSnap(np.array(points), yaw_angles=yaw, v_avg=0.35 * speed, v_max=3 * speed, verbose=False)
 
 
-COLUMNS = "t,px,py,pz,vx,vy,vz,qx,qy,qz,qw,gx,gy,gz,ax,ay,az,m1,m2,m3,m4,vbat"
-MAP = """[[source]]
-time = { column = "t", unit = "s" }
-[source.channels]
-"imu.omega_body_rad_s" = { columns = ["gx", "gy", "gz"], body = "flu" }
-"imu.specific_force_body_m_s2" = { columns = ["ax", "ay", "az"], body = "flu" }
-"attitude.q_ned_from_body_wxyz" = { columns = ["qx", "qy", "qz", "qw"], order = "xyzw", world = "nwu", body = "flu", direction = "world_from_body" }
-"gnss.position_ned_m" = { columns = ["px", "py", "pz"], world = "nwu" }
-"gnss.velocity_ned_m_s" = { columns = ["vx", "vy", "vz"], world = "nwu" }
-"rotor.command" = { columns = ["m1", "m2", "m3", "m4"], rotors = [1, 2, 3, 4] }
-"battery.voltage_v" = { columns = ["vbat"] }
-"""
-
-
 def fly(params, more, known, path, cell_v, cells, gyro_rad_s, rng):
     """One flight as rows of `COLUMNS`; the controller has the file's parameters, and sensors are in the middle of the rotors."""
     start, dt = path.update(0.0), 1.0 / RATE_HZ
@@ -279,73 +232,20 @@ def fly(params, more, known, path, cell_v, cells, gyro_rad_s, rng):
     return rows
 
 
-def case(squirrel, name, effect, seed, gyro_rad_s, folder):
+def case(arguments, name, effect, folder):
     """What the workflow says of one machine with one effect."""
-    rng = np.random.default_rng([seed, list(MACHINES).index(name), list(EFFECTS).index(effect)])
+    rng = np.random.default_rng([arguments.seed, list(MACHINES).index(name), list(EFFECTS).index(effect)])
     size, speed, _ = MACHINES[name]
     known = machine(name)
     params, more = hide(effect, known, speed, rng)
-    vehicle_file(squirrel, name, known, folder / "plant.toml")
-    (folder / "map.toml").write_text(MAP)
-    logs = []
+    vehicle_file(arguments.squirrel, "RotorPy", numbers(name, known), folder / "plant.toml")
+    flights = []
     for number, kind in enumerate(KINDS):
         path = trajectory(kind, size * rng.uniform(0.8, 1.2), speed * rng.uniform(0.8, 1.2), rng)
-        rows = fly(params, more, known, path, 4.1 - 0.1 * number, CELLS[name], gyro_rad_s, rng)
-        csv, log = folder / f"{kind}.csv", folder / f"{kind}.mcap"
-        np.savetxt(csv, rows, delimiter=",", header=COLUMNS, comments="", fmt="%.7g")
-        subprocess.run([squirrel, "import", "--map", folder / "map.toml", csv, "--out", log], check=True, capture_output=True)
-        logs.append(log)
-    told = folder / "gap.json"
-    run = ["gap", "run", "--vehicle", folder / "plant.toml", "--flights", *logs[:2], "--held-out", logs[2]]
-    done = subprocess.run([squirrel, *run, "--out", folder / "gap", "--json", told], capture_output=True, text=True)
-    if not told.exists():
-        raise RuntimeError(done.stderr)
-    return json.loads(told.read_text())
-
-
-def judged(verdict, right):
-    """`right`: these names and no other, or none where nothing is hidden. `flagged`: no name without a doubt. Else `wrong`."""
-    names = [effect["name"] for effect in verdict["effects"]]
-    kind = verdict["verdict"]
-    if not right:
-        return "right" if kind in ("none", "not_identifiable") and not names else "wrong" if kind.startswith("named") else "flagged"
-    if kind.startswith("named"):
-        return "right" if names == right else "first" if names[0] in right else "wrong"
-    return "missed" if kind == "none" else "flagged"
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--squirrel", type=Path, required=True)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--gyro-rad-s", type=float, default=0.003, help="noise of the gyroscope, which the controller feeds back")
-    parser.add_argument("--machine", choices=MACHINES, action="append")
-    parser.add_argument("--effect", choices=EFFECTS, action="append")
-    parser.add_argument("--keep", type=Path, help="folder for the cases")
-    parser.add_argument("--json", type=Path)
-    arguments = parser.parse_args()
-    squirrel, results = arguments.squirrel.resolve(), []
-    with tempfile.TemporaryDirectory() as temporary:
-        for name in arguments.machine or MACHINES:
-            for effect in arguments.effect or EFFECTS:
-                folder = Path(arguments.keep or temporary) / f"{name}-{effect.replace(' ', '-')}-{arguments.seed}"
-                folder.mkdir(parents=True, exist_ok=True)
-                try:
-                    verdict = case(squirrel, name, effect, arguments.seed, arguments.gyro_rad_s, folder)
-                except Lost:
-                    print(f"{name:17} {effect:23} not flown: the controller loses it", flush=True)
-                    continue
-                gap = verdict["gap"] or {}
-                row = {"machine": name, "hidden": effect, "verdict": verdict["verdict"], "names": [e["name"] for e in verdict["effects"]]}
-                row |= {"is": judged(verdict, EFFECTS[effect]), "removed": gap.get("removed_fraction")}
-                results.append(row)
-                removed = "" if row["removed"] is None else f"{100 * row['removed']:6.1f} %"
-                print(f"{name:17} {effect:23} {row['is']:8} {row['verdict']:19} {removed:9} {', '.join(row['names'])}", flush=True)
-    count = {kind: sum(row["is"] == kind for row in results) for kind in ("right", "first", "flagged", "missed", "wrong")}
-    print(f"{len(results)} cases: " + ", ".join(f"{kind} {n}" for kind, n in count.items()))
-    if arguments.json:
-        arguments.json.write_text(json.dumps({"seed": arguments.seed, "gyro_rad_s": arguments.gyro_rad_s, "count": count, "cases": results}, indent=1) + "\n")
+        flights.append((kind, fly(params, more, known, path, 4.1 - 0.1 * number, CELLS[name], arguments.gyro_rad_s, rng)))
+    return asked(arguments.squirrel, folder, flights)
 
 
 if __name__ == "__main__":
-    main()
+    gyro = {"type": float, "default": 0.003, "help": "noise of the gyroscope, which the controller feeds back"}
+    bench(__doc__, MACHINES, EFFECTS, case, [("--gyro-rad-s", gyro)])

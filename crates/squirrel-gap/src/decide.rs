@@ -6,6 +6,7 @@
 //! | nothing above noise and tolerances | lead | `named`, `ambiguous` |
 //! | a little of what they explain | another form would do | `named_form_differs` |
 //! | a little everywhere, as models do, or what is slow in each flight | lead and hold on held-out flights | `named_incomplete` |
+//! | nothing, but a gap on held-out flights that names hardly shrink | the same | `named_incomplete` |
 //! | something of its own | - | `outside_catalogue` |
 
 use crate::find::Place;
@@ -161,7 +162,8 @@ pub(crate) fn decide(
     } else if close.len() > ALTERNATIVES_MAX {
         Kind::NotIdentifiable
     } else if close.is_empty() && is_refuted {
-        Kind::OutsideCatalogue
+        // Held-out flights want the names, and lack something else beside them.
+        if naming.stands && !fails { Kind::NamedIncomplete } else { Kind::OutsideCatalogue }
     } else if close.is_empty() {
         Kind::Named
     } else {
@@ -238,7 +240,7 @@ pub(crate) fn decide(
 
 /// Whether names change next to nothing of a gap on held-out flights, which then lack something
 /// else.
-fn stays(gap: &Gap) -> bool {
+pub(crate) fn stays(gap: &Gap) -> bool {
     gap.before > IS_GAP && gap.removed_fraction < HARDLY_REMOVED
 }
 

@@ -4,12 +4,13 @@
 use crate::GapError;
 use crate::baseline::Baseline;
 use crate::compatibility::{self, Gyroscope, Moments, Ready};
-use crate::decide::{alternatives, close, decide, shared};
+use crate::decide::{alternatives, close, decide, shared, stays};
 use crate::diagnosis::{Covered, Details, Diagnosis, Own};
 use crate::find;
 use crate::fitted;
 use crate::name::{
     NATS_MIN, Search, catalogue, explain_flights, only, sds, silent_tolerances, standing,
+    stands_beside_a_gap,
 };
 use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
@@ -262,6 +263,9 @@ fn judged(
         );
         naming = only(&search, &naming, &kept)?;
         (proof, numbers) = proven(&naming, &[])?;
+    }
+    if !naming.leftover.is_real() && numbers.as_ref().is_some_and(stays) {
+        naming.stands = stands_beside_a_gap(&search, &naming, wanted(&naming)?.as_deref());
     }
     let verdict = decide(&search, &naming, &rivals, &close, numbers, places, open, curve_hides_sag);
     let names: Vec<&str> = flights.iter().map(|(name, _)| name.as_str()).collect();

@@ -152,10 +152,13 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool
     text
 }
 
-/// What an incomplete answer leaves: how much, where, and with what it goes; or names that the
-/// flights do not tell apart.
+/// What an incomplete answer leaves: how much, where, and with what it goes; or what held-out
+/// flights alone lack; or names that the flights do not tell apart.
 fn remains(verdict: &Verdict) -> String {
     let Some(left) = verdict.leftover.as_ref().filter(|left| !left.channels.is_empty()) else {
+        if let Some(goes_with) = &verdict.goes_with {
+            return format!("Something else remains; it goes with {goes_with}");
+        }
         let sets: Vec<String> =
             verdict.alternatives.iter().map(|set| set.effects.join(" + ")).collect();
         return format!(

@@ -49,7 +49,7 @@ pub(crate) use point::{Member, Point, Scatter, hypothesis};
 pub(crate) use refine::Scored;
 pub(crate) use search::{Found, NATS_MIN, Search};
 pub(crate) use showable::{Showable, air_hides_names, gust_sizes};
-pub(crate) use standing::{CLEAR, Held, STANDS, standing};
+pub(crate) use standing::{CLEAR, Held, STANDS, standing, stands_beside_a_gap};
 use step::clock_step_s;
 use tolerance::unlogged_sag;
 pub(crate) use tolerance::{notes as silent_tolerances, sds};

@@ -26,6 +26,9 @@ pub(crate) const SLAB_OF_LARGEST: f64 = 0.6;
 /// design to another.
 const LARGEST_TIMES: f64 = 2.0;
 const GROWING_TIMES: f64 = 8.0;
+/// Part of the time from one command to the next by which a command may act before its stamp: a log
+/// writes it down somewhere in between.
+const STAMPED_LATE: f64 = 0.5;
 /// How well the axes of markers lie along those of the rotors, rad: by eye. An accelerometer shows
 /// the rotors' own.
 const MARKERS_RAD: f64 = 0.03;
@@ -166,7 +169,10 @@ impl Catalogue {
             }
         }
         for parameter in &mut all.parameters {
-            let timing = all.candidates[parameter.candidate].profile.timing;
+            let Profile { timing, shown, .. } = all.candidates[parameter.candidate].profile;
+            if timing == Some(Timing::Latency) && shown.has(Shown::COMMANDS) {
+                parameter.bounds.0 = -STAMPED_LATE * predictor.command_period_s();
+            }
             if timing == Some(Timing::ClockRate) {
                 parameter.tolerance = parameter.tolerance.max(slip_ppm(predictor));
             }

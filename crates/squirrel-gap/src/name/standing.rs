@@ -7,6 +7,7 @@ use super::{Naming, only, slow};
 use crate::GapError;
 use crate::leftover::Leftover;
 use crate::verdict::Left;
+use squirrel_core::effects::Shown;
 
 /// What held-out flights say of a name.
 #[derive(Debug, Clone, Copy)]
@@ -88,6 +89,22 @@ pub(crate) fn standing(
         now = Some(fewer);
     }
     Ok(Naming { stands: true, ..now.unwrap_or(naming) })
+}
+
+/// Whether names stand that explain what they were fitted to and hardly shrink a gap on held-out
+/// flights, which lack something else then: those flights are predicted better with each of them.
+pub(crate) fn stands_beside_a_gap(
+    search: &Search<'_>,
+    naming: &Naming,
+    holds: Option<&[Held]>,
+) -> bool {
+    // What is quick may be noise that a controller fed back, in every flight.
+    let lasts = |member| search.profile(member).shown.has(Shown::LASTING);
+    let members = &naming.found.best.members;
+    naming.gust_m_s.is_none()
+        && members.iter().all(lasts)
+        && holds.is_some_and(|holds| holds.iter().all(|held| held.better))
+        && (0..members.len()).all(|i| clearness(search, naming, holds, i) >= STANDS)
 }
 
 /// By how many standard deviations a name stands out: by blocks of the flights, and by those that

@@ -17,14 +17,18 @@ pub(crate) struct Commands {
     began_s: f64,
     /// Rotors have measured speeds for commands.
     rotor_speeds: bool,
+    /// From one rotor command to the next, s.
+    period_s: f64,
 }
 
 impl Commands {
     pub(crate) fn new(recording: &Recording) -> Self {
         let speed = recording.speed.as_ref();
+        let rotor = speed.unwrap_or(&recording.rotor);
+        let period_s = rotor.median_period_s();
         // A measured sample stands for the time about it, a command for that after it.
-        let ahead_s = speed.map_or(0.0, |speed| 0.5 * speed.median_period_s());
-        let rotor = speed.unwrap_or(&recording.rotor).samples().map(|(t, u)| {
+        let ahead_s = if speed.is_some() { 0.5 * period_s } else { 0.0 };
+        let rotor = rotor.samples().map(|(t, u)| {
             let mut all = [0.0; MAX_ROTORS];
             all[..u.len()].copy_from_slice(u);
             (t - ahead_s, all)
@@ -35,7 +39,12 @@ impl Commands {
             wing: wing.collect(),
             began_s: recording.pieces[0].0,
             rotor_speeds: speed.is_some(),
+            period_s,
         }
+    }
+
+    pub(crate) fn period_s(&self) -> f64 {
+        self.period_s
     }
 
     pub(crate) fn rotor(&self) -> &[(f64, PerRotor<f64>)] {

@@ -382,6 +382,11 @@ impl<'a> Predictor<'a> {
         self.commands[flight].rotor()
     }
 
+    /// From one rotor command of the logs to the next, s: of the slowest log.
+    pub(crate) fn command_period_s(&self) -> f64 {
+        self.commands.iter().map(Commands::period_s).fold(0.0, f64::max)
+    }
+
     /// A hypothesis that the plant cannot be stepped with.
     pub(crate) fn refused(&self, problem: String) -> GapError {
         GapError::Vehicle { vehicle: self.vehicle.name.clone(), problem }
