@@ -9,7 +9,7 @@ in a control period, in its middle, beside the command that acts from its beginn
 import warnings
 
 import numpy as np
-from common import AIR_KG_M3, Lost, asked, bench, vehicle_file
+from common import AIR_KG_M3, GRAVITY_M_S2, Lost, asked, bench, vehicle_file
 from PyFlyt.core import Aviary
 from scipy.spatial.transform import Rotation
 
@@ -18,7 +18,6 @@ CONTROL_HZ = 240
 PHYSICS_HZ = 960
 FLIGHT_S = 32.0
 LOG_FROM_S = 2.0
-GRAVITY_M_S2 = 9.81
 FLIGHTS = 3
 START_M = np.array([0.0, 0.0, 10.0])
 # PyFlyt multiplies rotor speeds by 1 + n N(4, 1) in each step.
@@ -187,9 +186,8 @@ def fly(name, known, hidden, seed, number, rng):
     return rows
 
 
-def case(arguments, name, effect, folder):
+def case(arguments, name, effect, rng, folder):
     """What the workflow says of one machine with one effect."""
-    rng = np.random.default_rng([arguments.seed, list(MACHINES).index(name), list(EFFECTS).index(effect)])
     known = numbers(name)
     hidden = hide(effect, known, MACHINES[name]["speed"], rng)
     vehicle_file(arguments.squirrel, "PyFlyt", known, folder / "plant.toml")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+GRAVITY_M_S2 = 9.81
 AIR_KG_M3 = 1.225
 FRD = np.array([1.0, -1.0, -1.0])
 
@@ -68,7 +69,7 @@ def vehicle_file(squirrel, source, numbers, path):
     put("reference_voltage_v", 3.7 * numbers["cells"], 0.1)
     text = re.sub(r"^cells = .*$", f"cells = {numbers['cells']}", text, flags=re.MULTILINE)
     put("thrust_max_n", 4 * numbers["thrust"] * numbers["top"] ** 2)
-    put("thrust_min_n", 0.1 * mass * 9.81)
+    put("thrust_min_n", 0.1 * mass * GRAVITY_M_S2)
     path.write_text(text)
 
 
@@ -103,7 +104,7 @@ def judged(verdict, right):
 def bench(words, machines, effects, case, more=()):
     """The command line: every machine with every effect, a line each, and how many are right.
 
-    `case(arguments, machine, effect, folder)` gives a verdict. `more`: further options, with what argparse wants.
+    `case(arguments, machine, effect, rng, folder)` gives a verdict. `more`: further options, with what argparse wants.
     """
     parser = argparse.ArgumentParser(description=words, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--squirrel", type=Path, required=True)
@@ -121,8 +122,9 @@ def bench(words, machines, effects, case, more=()):
             for effect in arguments.effect or effects:
                 folder = Path(arguments.keep or temporary) / f"{name}-{effect.replace(' ', '-')}-{arguments.seed}"
                 folder.mkdir(parents=True, exist_ok=True)
+                rng = np.random.default_rng([arguments.seed, list(machines).index(name), list(effects).index(effect)])
                 try:
-                    verdict = case(arguments, name, effect, folder)
+                    verdict = case(arguments, name, effect, rng, folder)
                 except Lost:
                     print(f"{name:17} {effect:23} not flown: the controller loses it", flush=True)
                     continue
@@ -135,5 +137,6 @@ def bench(words, machines, effects, case, more=()):
     count = {kind: sum(row["is"] == kind for row in results) for kind in ("right", "first", "flagged", "missed", "wrong")}
     print(f"{len(results)} cases: " + ", ".join(f"{kind} {n}" for kind, n in count.items()))
     if arguments.json:
-        given = {option.lstrip("-").replace("-", "_"): getattr(arguments, option.lstrip("-").replace("-", "_")) for option, _ in more}
+        names = [option.lstrip("-").replace("-", "_") for option, _ in more]
+        given = {name: getattr(arguments, name) for name in names}
         arguments.json.write_text(json.dumps({"seed": arguments.seed, **given, "count": count, "cases": results}, indent=1) + "\n")

@@ -10,7 +10,7 @@ import copy
 import importlib
 
 import numpy as np
-from common import AIR_KG_M3, Lost, asked, bench, vehicle_file
+from common import AIR_KG_M3, GRAVITY_M_S2, Lost, asked, bench, vehicle_file
 from rotorpy.controllers.quadrotor_control import SE3Control
 from rotorpy.trajectories.circular_traj import ThreeDCircularTraj
 from rotorpy.trajectories.lissajous_traj import TwoDLissajous
@@ -22,7 +22,6 @@ RATE_HZ = 200
 FLIGHT_S = 32.0
 # The log begins in flight: what a plant does from a standing start is not what is asked.
 LOG_FROM_S = 2.0
-GRAVITY_M_S2 = 9.81
 KINDS = ("minsnap", "lissajous", "circle")
 
 # Half the width of the space flown in, m, speed, m/s, and how firmly attitude is held, 1/s^2 and 1/s. The rotors are slower than
@@ -232,9 +231,8 @@ def fly(params, more, known, path, cell_v, cells, gyro_rad_s, rng):
     return rows
 
 
-def case(arguments, name, effect, folder):
+def case(arguments, name, effect, rng, folder):
     """What the workflow says of one machine with one effect."""
-    rng = np.random.default_rng([arguments.seed, list(MACHINES).index(name), list(EFFECTS).index(effect)])
     size, speed, _ = MACHINES[name]
     known = machine(name)
     params, more = hide(effect, known, speed, rng)

@@ -15,7 +15,7 @@ const LIST: &str = "docs/guide/effects.md";
 /// catalogues.
 const LINES_MAX: usize = 4;
 const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// What is asked of the copy, by module. The last two ask for one effect by `SQUIRREL_EFFECT`.
+/// What is asked of the copy, by module or the beginning of a name. The last two ask for one effect by `SQUIRREL_EFFECT`.
 const TESTS: [&str; 4] = ["effects::", "vehicle::every_effect", "seen_by_find::", "twins::"];
 
 /// Crates of the copy that are compiled with little optimisation or none: compiling them takes far

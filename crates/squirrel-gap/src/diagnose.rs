@@ -265,7 +265,7 @@ fn judged(
         (proof, numbers) = proven(&naming, &[])?;
     }
     if !naming.leftover.is_real() && numbers.as_ref().is_some_and(stays) {
-        naming.stands = stands_beside_a_gap(&search, &naming, wanted(&naming)?.as_deref());
+        naming.stands = stands_beside_a_gap(&search, &naming, wanted)?;
     }
     let verdict = decide(&search, &naming, &rivals, &close, numbers, places, open, curve_hides_sag);
     let names: Vec<&str> = flights.iter().map(|(name, _)| name.as_str()).collect();

@@ -59,9 +59,7 @@ pub(crate) fn standing(
             return Ok(naming);
         }
         let holds = hold(&naming)?;
-        let stands = (0..naming.found.best.members.len())
-            .all(|index| clearness(search, &naming, holds.as_deref(), index) >= STANDS)
-            && holds.as_ref().is_none_or(|holds| holds.iter().all(|held| held.better))
+        let stands = all_stand(search, &naming, holds.as_deref())
             && slow::leaves_nothing_else(search, &naming, holds.as_deref())?;
         return Ok(Naming { stands, ..naming });
     }
@@ -93,18 +91,28 @@ pub(crate) fn standing(
 
 /// Whether names stand that explain what they were fitted to and hardly shrink a gap on held-out
 /// flights, which lack something else then: those flights are predicted better with each of them.
+///
+/// * `hold` - of [`standing`]; asked only of names that may stand
+///
+/// # Errors
+/// What the predictor says.
 pub(crate) fn stands_beside_a_gap(
     search: &Search<'_>,
     naming: &Naming,
-    holds: Option<&[Held]>,
-) -> bool {
+    hold: impl Fn(&Naming) -> Result<Option<Vec<Held>>, GapError>,
+) -> Result<bool, GapError> {
     // What is quick may be noise that a controller fed back, in every flight.
     let lasts = |member| search.profile(member).shown.has(Shown::LASTING);
     let members = &naming.found.best.members;
-    naming.gust_m_s.is_none()
-        && members.iter().all(lasts)
-        && holds.is_some_and(|holds| holds.iter().all(|held| held.better))
-        && (0..members.len()).all(|i| clearness(search, naming, holds, i) >= STANDS)
+    let may_stand = naming.gust_m_s.is_none() && !members.is_empty() && members.iter().all(lasts);
+    Ok(may_stand && all_stand(search, naming, hold(naming)?.as_deref()))
+}
+
+/// Whether every name is clear, and held-out flights, where there are any, want it.
+fn all_stand(search: &Search<'_>, naming: &Naming, holds: Option<&[Held]>) -> bool {
+    holds.is_none_or(|holds| holds.iter().all(|held| held.better))
+        && (0..naming.found.best.members.len())
+            .all(|index| clearness(search, naming, holds, index) >= STANDS)
 }
 
 /// By how many standard deviations a name stands out: by blocks of the flights, and by those that

@@ -20,10 +20,6 @@ fn plan(trials: u32) -> Plan {
 /// Studies with so many cells that one trial of each is plenty.
 const WIDE: [&str; 2] = ["rivals", "wind"];
 
-/// What would take most of the time of the test that flies every study; `kept nowhere` is told from
-/// the others.
-const LONG: [&str; 3] = ["rivals", "steering", "table2"];
-
 /// A study's result as JSON, where it has one: with as little to do as there can be.
 fn fly(study: &Study, keep: &Keep<'_>) -> Result<Option<String>, FlightError> {
     let mut plan = plan(if WIDE.contains(&study.name) { 1 } else { 2 });
@@ -87,9 +83,7 @@ fn stopped_threaded_and_merged_studies_leave_the_same_bytes() {
         let whole = folder.below("whole");
         let result = pool(2).install(|| study(&keep(&whole, Part::All))).unwrap();
         assert!(result.is_some(), "{name}");
-        if !LONG.contains(&name) {
-            assert_eq!(study(&Keep::default()).unwrap(), result, "{name}: kept nowhere");
-        }
+        assert_eq!(study(&Keep::default()).unwrap(), result, "{name}: kept nowhere");
 
         // Stopped in the middle of a line, and gone on with one thread.
         let stopped = folder.below("stopped");
