@@ -132,8 +132,8 @@ fn derivative<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>
     if WING == MEMBRANE {
         let y = lateral(whole.membrane.arm_m);
         let (rate, open) = (&whole.angle_rate, &whole.deployment);
-        let ([f, m], left) = whole.membrane.evaluate(&air, y[0], rate[0], open[0], &sides[0]);
-        let ([g, n], right) = whole.membrane.evaluate(&air, y[1], rate[1], open[1], &sides[1]);
+        let ([f, m], left) = wing(&whole.membrane, &air, y[0], [rate[0], open[0]], &sides[0]);
+        let ([g, n], right) = wing(&whole.membrane, &air, y[1], [rate[1], open[1]], &sides[1]);
         rest = BodyWrench { force: vector::plus(&f, &g), moment: vector::plus(&m, &n) };
         sides_rate = [left, right];
     }
@@ -162,9 +162,50 @@ fn derivative<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>
                 None
             },
         };
-        with_effects(&whole.effects, whole.present, [&rotors, &rest], &at)
+        if L::FITS_A_REGISTER {
+            with_effects(&whole.effects, whole.present, [&rotors, &rest], &at)
+        } else {
+            effects_apart(&whole.effects, whole.present, [&rotors, &rest], &at)
+        }
     } else {
         rotors.plus(&rest)
     };
     (body_rate(airframe, state, &columns, &sum, rotor_rate), sides_rate)
+}
+
+/// [`Membrane::evaluate`].
+#[inline(always)]
+fn wing<L: Lane>(
+    membrane: &Membrane<L>,
+    air: &Airflow<L>,
+    y: L,
+    [rate, open]: [L; 2],
+    side: &Side<L>,
+) -> ([[L; 3]; 2], Side<L>) {
+    if L::FITS_A_REGISTER {
+        membrane.evaluate(air, y, rate, open, side)
+    } else {
+        wing_apart(membrane, air, y, [rate, open], side)
+    }
+}
+
+#[inline(never)]
+fn wing_apart<L: Lane>(
+    membrane: &Membrane<L>,
+    air: &Airflow<L>,
+    y: L,
+    [rate, open]: [L; 2],
+    side: &Side<L>,
+) -> ([[L; 3]; 2], Side<L>) {
+    membrane.evaluate(air, y, rate, open, side)
+}
+
+#[inline(never)]
+fn effects_apart<L: Lane>(
+    numbers: &Prepared<L>,
+    present: Present,
+    wrenches: [&BodyWrench<L>; 2],
+    at: &Surroundings<'_, L>,
+) -> BodyWrench<L> {
+    with_effects(numbers, present, wrenches, at)
 }

@@ -17,7 +17,9 @@ pub struct Dual<const N: usize> {
 
 impl<const N: usize> Dual<N> {
     /// A number that depends on nothing.
-    #[inline(always)]
+    // Here and where there is a loop not `always`: LLVM then unrolls it once, before it is a part of a
+    // step, where thousands of them take it a minute.
+    #[inline]
     pub fn constant(value: f64) -> Self {
         Self { value, by: [0.0; N] }
     }
@@ -88,11 +90,12 @@ impl<const N: usize> Div for Dual<N> {
 
 impl<const N: usize> Lane for Dual<N> {
     type Element = f64;
-    #[inline(always)]
+    const FITS_A_REGISTER: bool = false;
+    #[inline]
     fn splat(element: f64) -> Self {
         Self::constant(element)
     }
-    #[inline(always)]
+    #[inline]
     fn of(constant: f64) -> Self {
         Self::constant(constant)
     }

@@ -45,6 +45,9 @@ pub trait Lane:
 {
     /// The scalar in which it is stored.
     type Element: Copy;
+    /// Whether it fits into a register. Of what does not, long formulas are functions of their own:
+    /// inlined they gain nothing, and the compiler takes a minute over them.
+    const FITS_A_REGISTER: bool = true;
     /// The same number everywhere.
     fn splat(element: Self::Element) -> Self;
     /// A constant.

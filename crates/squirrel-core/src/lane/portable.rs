@@ -19,11 +19,14 @@ macro_rules! portable {
             type Element = $scalar;
             #[inline(always)]
             fn splat(element: $scalar) -> Self {
-                Self([element; $width])
+                // Not `[element; N]`: that is a loop in each place, and LLVM takes a minute to be rid
+                // of thousands in one function.
+                $(let $a = element;)*
+                Self([$($a),*])
             }
             #[inline(always)]
             fn of(constant: f64) -> Self {
-                Self([constant as $scalar; $width])
+                Self::splat(constant as $scalar)
             }
             #[inline(always)]
             fn lower(self, bound: Self) -> Self {
@@ -74,9 +77,9 @@ macro_rules! portable {
             const WIDTH: usize = $width;
             #[inline(always)]
             fn load(from: &[$scalar]) -> Self {
-                let mut numbers = [0.0; $width];
-                numbers.copy_from_slice(&from[..$width]);
-                Self(numbers)
+                let mut register = Self::of(0.0);
+                register.0.copy_from_slice(&from[..$width]);
+                register
             }
             #[inline(always)]
             fn store(self, to: &mut [$scalar]) {

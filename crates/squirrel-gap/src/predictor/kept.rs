@@ -3,19 +3,17 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// Answers that are kept: of the hypothesis that others are compared with, and of the last.
-const KEPT: usize = 2;
+/// The last `N` answers by what they depend on, the newest first; two are that of the hypothesis that
+/// others are compared with, and the last.
+pub(crate) struct Kept<K, V, const N: usize = 2>(RefCell<Vec<(K, Rc<V>)>>);
 
-/// Answers by what they depend on, the newest first.
-pub(crate) struct Kept<K, V>(RefCell<Vec<(K, Rc<V>)>>);
-
-impl<K, V> Default for Kept<K, V> {
+impl<K, V, const N: usize> Default for Kept<K, V, N> {
     fn default() -> Self {
         Self(RefCell::new(Vec::new()))
     }
 }
 
-impl<K: PartialEq, V> Kept<K, V> {
+impl<K: PartialEq, V, const N: usize> Kept<K, V, N> {
     /// The answer for a key, asked for if it is not there.
     pub(crate) fn get(&self, key: K, ask: impl FnOnce() -> V) -> Rc<V> {
         let mut kept = self.0.borrow_mut();
@@ -23,7 +21,7 @@ impl<K: PartialEq, V> Kept<K, V> {
             Some(index) => kept.remove(index).1,
             None => Rc::new(ask()),
         };
-        kept.truncate(KEPT - 1);
+        kept.truncate(N - 1);
         kept.insert(0, (key, Rc::clone(&answer)));
         answer
     }
@@ -35,7 +33,7 @@ mod tests {
 
     #[test]
     fn what_was_asked_last_is_not_asked_again() {
-        let kept = Kept::default();
+        let kept = Kept::<i32, i32>::default();
         let asked = RefCell::new(0);
         let square = |x: i32| {
             *kept.get(x, || {

@@ -63,8 +63,14 @@ impl Surroundings {
             .map(|(i, obstacle)| (apart(obstacle, at.xy()), i))
             .filter(|(square, _)| *square < HORIZON_M * HORIZON_M)
             .collect();
-        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        near.truncate(MAX_OBSTACLES);
+        let order = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        // Hundreds are within the horizon, 300 times a second: only those that are handed on are put
+        // in order.
+        if near.len() > MAX_OBSTACLES {
+            near.select_nth_unstable_by(MAX_OBSTACLES, order);
+            near.truncate(MAX_OBSTACLES);
+        }
+        near.sort_unstable_by(order);
         near.iter()
             .map(|(_, i)| {
                 let [north, east, _] = self.all[*i];
