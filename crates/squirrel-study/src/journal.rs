@@ -302,9 +302,9 @@ impl<'a> Journal<'a> {
         trials: u32,
         fly: impl Fn(u32) -> Result<T, FlightError> + Sync,
     ) -> Result<Option<Vec<T>>, FlightError> {
-        let one = |trial: u32| {
-            let result = match self.done.get(&trial) {
-                Some(line) => self.read(line)?,
+        let one = |(trial, kept): (u32, Option<T>)| {
+            let result = match kept {
+                Some(result) => result,
                 None => self.write_down(trial, &fly(trial)?)?,
             };
             self.keep.done(1);
@@ -318,6 +318,12 @@ impl<'a> Journal<'a> {
             let problem = format!("flight = {trial}: missing, in none of the merged folders");
             return Err(self.at(&problem));
         }
+        // Likewise, and before anything is flown.
+        let with_kept = |trial: u32| {
+            let kept = self.done.get(&trial).map(|line| self.read(line)).transpose()?;
+            Ok((trial, kept))
+        };
+        let mine = mine.into_iter().map(with_kept).collect::<Result<Vec<_>, FlightError>>()?;
         self.keep.ahead(mine.len());
         let all: Vec<T> = mine.into_par_iter().map(one).collect::<Result<_, _>>()?;
         if let Part::Shard(_) = self.keep.part {
