@@ -99,7 +99,7 @@ pub(crate) fn test(arguments: &[String]) -> Result<(), String> {
     run(&steps)
 }
 
-/// Benches that take the compiler more than a minute.
+/// Benches that take the compiler far longer than `--quick` takes to run them.
 const LONG_TO_COMPILE: [&str; 1] = ["jacobian"];
 
 /// `cargo xtask bench`: whole workspace, so that features and thus the built libraries are those of
