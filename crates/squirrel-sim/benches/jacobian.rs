@@ -1,7 +1,7 @@
 //! A step of the plant that carries derivatives by twelve numbers, beside the step alone, of which
 //! central differences take 24.
 //!
-//! By itself, because it takes the compiler longer than its run.
+//! By itself, because it takes the compiler long.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use squirrel_core::dynamics::State;

@@ -173,7 +173,7 @@ fn derivative<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>
     (body_rate(airframe, state, &columns, &sum, rotor_rate), sides_rate)
 }
 
-/// [`Membrane::evaluate`].
+/// [`Membrane::evaluate`]: in place, or as a function of its own, see [`Lane::FITS_A_REGISTER`].
 #[inline(always)]
 fn wing<L: Lane>(
     membrane: &Membrane<L>,
@@ -189,6 +189,7 @@ fn wing<L: Lane>(
     }
 }
 
+// One instance for both sides and any number of rotors.
 #[inline(never)]
 fn wing_apart<L: Lane>(
     membrane: &Membrane<L>,

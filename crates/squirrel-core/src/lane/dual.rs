@@ -17,8 +17,8 @@ pub struct Dual<const N: usize> {
 
 impl<const N: usize> Dual<N> {
     /// A number that depends on nothing.
-    // Here and where there is a loop not `always`: LLVM then unrolls it once, before it is a part of a
-    // step, where thousands of them take it a minute.
+    // Not `always`, nor are `splat` and `of`: the zeros are a loop, which LLVM then unrolls before it
+    // is a part of a step. Sums and products are `always`: so a Jacobian takes an eighth less.
     #[inline]
     pub fn constant(value: f64) -> Self {
         Self { value, by: [0.0; N] }

@@ -35,6 +35,7 @@ impl<L: Lane, const N: usize> Several<L, N> {
     /// The same lane in each place.
     #[inline(always)]
     pub fn all(lane: L) -> Self {
+        // Not `[lane; N]`, as in `Portable::splat`.
         Self(from_fn(|_| lane))
     }
     /// Two of each lane.

@@ -3,8 +3,8 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// The last `N` answers by what they depend on, the newest first; two are that of the hypothesis that
-/// others are compared with, and the last.
+/// The last `N` answers by what they depend on, the newest first: by default that of the hypothesis
+/// that others are compared with, and the last.
 pub(crate) struct Kept<K, V, const N: usize = 2>(RefCell<Vec<(K, Rc<V>)>>);
 
 impl<K, V, const N: usize> Default for Kept<K, V, N> {

@@ -104,8 +104,8 @@ pub(crate) struct Predictor<'a> {
     dynamics: Vec<Kept<Asked, Vec<Vector6<f64>>, ANSWERS>>,
 }
 
-/// Residuals of a track that are kept: a search comes back to where it was, and with the bytes of eight
-/// a case takes 5 % less of the processor; 32 save no more.
+/// Residuals of a track that are kept: a search comes back to where it was. With eight a case takes
+/// 5 % less of the processor; 32 save no more.
 const ANSWERS: usize = 8;
 
 impl<'a> Predictor<'a> {
