@@ -43,7 +43,7 @@ const QUICK_NEEDS: Step = Step {
     action: Action::Function(|| python::reachable().map(|()| String::new())),
 };
 
-const TEST: [Step; 13] = [
+const TEST: [Step; 14] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     // Examples as tests alone: clippy has looked at the programs that they are, too.
     Step {
@@ -55,7 +55,6 @@ const TEST: [Step; 13] = [
         action: Action::Cargo(&["test", "--release", "--workspace", "--locked", "--doc"]),
     },
     Step { name: "thumb", action: Action::Function(thumb::check) },
-    Step { name: "firmware", action: Action::Function(firmware::step) },
     Step { name: "deny", action: Action::Function(deny) },
     Step { name: "notices", action: Action::Function(notices::step) },
     // Workspace features always have rapier; this is the simulator as who flies free builds it.
@@ -66,9 +65,18 @@ const TEST: [Step; 13] = [
     Step { name: "demo", action: Action::Function(demo) },
     Step { name: "weights", action: Action::Function(weights::check) },
     Step { name: "crates", action: Action::Function(|| package::crates().map(|()| String::new())) },
+    Step {
+        name: "packages",
+        action: Action::Beside { after: "python", chore: &["wheel", "--environment"] },
+    },
     Step { name: "wheel", action: Action::Function(wheel::step) },
     // With the program and the package as they are built now.
     Step { name: "docs", action: Action::Function(docs::step) },
+    // Its target folder is its own, and the program is there.
+    Step {
+        name: "firmware",
+        action: Action::Beside { after: "test", chore: &["firmware", "--if-emulator"] },
+    },
 ];
 
 /// What `--quick` does after format and clippy: no documentation and its examples, no target but
@@ -293,6 +301,15 @@ mod tests {
         assert!(names.iter().all(|name| name.len() <= 10), "{names:?}");
         names.sort_unstable();
         assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
+    }
+
+    #[test]
+    fn what_runs_beside_begins_after_an_earlier_step() {
+        for (place, step) in TEST.iter().enumerate() {
+            if let Action::Beside { after, .. } = step.action {
+                assert!(TEST[..place].iter().any(|earlier| earlier.name == after), "{after}");
+            }
+        }
     }
 
     #[test]

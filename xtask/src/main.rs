@@ -3,6 +3,7 @@
 //! No dependency, so that the first command on a fresh machine starts within seconds. Talk goes to
 //! stderr.
 
+mod beside;
 mod chores;
 mod docs;
 mod effect;
@@ -74,7 +75,7 @@ const CHORES: [Chore; 21] = [
     ("thumb", "", "check that the flight code compiles for a Cortex-M7 without std", thumb::chore),
     (
         "firmware",
-        "[--write]",
+        "[--write|--if-emulator]",
         "the flight code on an emulated Cortex-M7: same bits, size, instructions; --write takes new figures",
         firmware::chore,
     ),
@@ -86,7 +87,7 @@ const CHORES: [Chore; 21] = [
     ),
     (
         "wheel",
-        "[ARGUMENT...]",
+        "[--environment|ARGUMENT...]",
         "build the Python package, install it, run its tests; arguments go to pytest",
         wheel::chore,
     ),

@@ -1,5 +1,7 @@
-//! Steps: commands or functions run one after another, with a table of seconds at the end.
+//! Steps: commands or functions run one after another, some chores beside them, with a table of
+//! seconds at the end.
 
+use crate::beside::Beside;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -19,6 +21,9 @@ pub(crate) enum Action {
     CargoWith((&'static str, &'static str), &'static [&'static str]),
     /// A function of ours; its note stands in the table.
     Function(fn() -> Result<String, String>),
+    /// A chore that begins when the step `after` has ended, and is waited for here: it fills the
+    /// processor where the steps between do not. It must share no folder with them.
+    Beside { after: &'static str, chore: &'static [&'static str] },
 }
 
 /// Installs Debian's packages where nobody can be asked, on CI as root; whether it did.
@@ -36,12 +41,16 @@ pub(crate) fn installed_on_ci(packages: &[&str]) -> bool {
 /// The name of the failed step and its error.
 pub(crate) fn run(steps: &[Step]) -> Result<(), String> {
     let mut rows = Vec::new();
+    let mut beside = Vec::new();
     let mut failure = None;
     for step in steps {
         eprintln!("\n==> {}", step.name);
-        let (result, time) = timed(|| act(&step.action));
+        let (result, time) = match begun(&mut beside, step.name) {
+            Some(chore) => chore.end(),
+            None => timed(|| act(&step.action)),
+        };
         rows.push((step.name, time, result.clone()));
-        if let Err(error) = result {
+        if let Err(error) = result.and_then(|_| begin_after(step.name, steps, &mut beside)) {
             failure = Some(format!("step '{}' failed: {error}", step.name));
             break;
         }
@@ -50,8 +59,30 @@ pub(crate) fn run(steps: &[Step]) -> Result<(), String> {
     failure.map_or(Ok(()), Err)
 }
 
+/// Starts the chores that begin when a step has ended.
+fn begin_after(
+    ended: &str,
+    steps: &[Step],
+    beside: &mut Vec<(&'static str, Beside)>,
+) -> Result<(), String> {
+    for step in steps {
+        if let Action::Beside { after, chore } = step.action
+            && after == ended
+        {
+            beside.push((step.name, Beside::begin(chore)?));
+        }
+    }
+    Ok(())
+}
+
+/// The chore of a step that has begun.
+fn begun(beside: &mut Vec<(&'static str, Beside)>, name: &str) -> Option<Beside> {
+    let place = beside.iter().position(|(own, _)| *own == name)?;
+    Some(beside.swap_remove(place).1)
+}
+
 #[allow(clippy::disallowed_methods, reason = "the wall clock is what the table shows")]
-fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
+pub(crate) fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     let start = Instant::now();
     let result = work();
     (result, start.elapsed())
@@ -64,6 +95,7 @@ fn act(action: &Action) -> Result<String, String> {
             call(cargo()?.env(key, value).args(*arguments)).map(|()| String::new())
         }
         Action::Function(function) => function(),
+        Action::Beside { chore, .. } => Beside::begin(chore)?.end().0,
     }
 }
 

@@ -17,8 +17,11 @@ const PACKAGES: &str = "numpy==2.4.6 maturin==1.16.0 pytest==9.2.0 pytest-xdist=
 /// Largest wheel.
 const BYTES_MAX: u64 = 8_000_000;
 
-/// `cargo xtask wheel`; arguments go to pytest.
+/// `cargo xtask wheel`; arguments go to pytest. `--environment` makes what the tests need and stops.
 pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
+    if arguments == ["--environment"] {
+        return python::environment(&environment()?, PACKAGES).map(|_| ());
+    }
     run(arguments).map(|note| eprintln!("{note}"))
 }
 

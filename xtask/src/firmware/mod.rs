@@ -46,7 +46,7 @@ const FAULTS: &str = "100";
 /// `cargo xtask firmware`.
 pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
     match arguments {
-        [] => check().map(|_| ()),
+        [] => check(),
         [write] if write == "--write" => {
             host()?.write_setup()?;
             let figures = measure()?;
@@ -59,23 +59,18 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
             eprintln!("wrote {FIGURES}");
             Ok(())
         }
-        _ => Err(format!("arguments = {}: must be none or --write", arguments.join(" "))),
-    }
-}
-
-/// [`check`] as a step of `cargo xtask test`: without an emulator it is left out and says so, but
-/// never on CI.
-///
-/// # Errors
-/// As [`check`].
-pub(crate) fn step() -> Result<String, String> {
-    match emulator() {
-        Err(_) if std::env::var_os("CI").is_none() => {
-            let note = format!("skipped: no {QEMU} (apt install {QEMU})");
-            eprintln!("{note}");
-            Ok(note)
-        }
-        _ => check(),
+        // As `cargo xtask test` has it: left out without an emulator, but never on CI.
+        [where_possible] if where_possible == "--if-emulator" => match emulator() {
+            Err(_) if std::env::var_os("CI").is_none() => {
+                eprintln!("skipped: no {QEMU} (apt install {QEMU})");
+                Ok(())
+            }
+            _ => check(),
+        },
+        _ => Err(format!(
+            "arguments = {}: must be none, --write or --if-emulator",
+            arguments.join(" ")
+        )),
     }
 }
 
@@ -83,7 +78,7 @@ pub(crate) fn step() -> Result<String, String> {
 ///
 /// # Errors
 /// What differs, is missing or grew.
-pub(crate) fn check() -> Result<String, String> {
+fn check() -> Result<(), String> {
     let figures = measure()?;
     let path = root()?.join(FIGURES);
     let text =
@@ -92,7 +87,7 @@ pub(crate) fn check() -> Result<String, String> {
     eprint!("{table}");
     check_budget(&figures)?;
     if grown.is_empty() {
-        Ok(String::new())
+        Ok(())
     } else {
         Err(format!(
             "{FIGURES}: {} grew; `cargo xtask firmware --write` takes the new figures",
@@ -168,7 +163,7 @@ fn measure() -> Result<Figures, String> {
 /// What is missing here that the step leaves out or, on CI, cannot do without.
 ///
 /// # Errors
-/// As [`step`], before anything is built.
+/// No emulator, before anything is built.
 pub(crate) fn missing() -> Result<Option<String>, String> {
     match emulator() {
         Ok(()) => Ok(None),

@@ -10,5 +10,7 @@ mod pages;
 mod parts;
 mod planning;
 mod real_filters;
+mod statistics;
 mod table2;
 mod thrust;
+mod until;
