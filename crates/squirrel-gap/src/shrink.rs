@@ -64,8 +64,9 @@ const STEP_MAX_S: f64 = 0.0012;
 
 pub(crate) type Errors = SVector<f64, 12>;
 
-/// Flights of noise that the floor is the mean of.
-const DRAWS: u64 = 3;
+/// Flights of noise that the floor is the mean of, each of every other segment: half of what one
+/// says its neighbours say, too.
+const DRAWS: usize = 3;
 /// Standard deviations of the scatter of a flight's noise that still are noise, and the least part
 /// of the mean that a lucky flight has.
 const SCATTER: f64 = 2.0;
@@ -161,7 +162,7 @@ impl<'a> Flown<'a> {
             }
             let segments = Segments::new(predictor, hypothesis, piece)?;
             let mut bins = Vec::new();
-            segments.fly(None, |bin| bins.push(bin));
+            segments.fly(0..segments.starts.len(), None, |bin| bins.push(bin));
             pieces.push((segments, bins));
         }
         Ok(Self { pieces })
@@ -191,8 +192,9 @@ impl<'a> Flown<'a> {
             let attitude_noise = track.attitude_noise();
             let white = (BIN_S / track.period_s).max(1.0).sqrt();
             for draw in 0..DRAWS {
-                let mut rng = Pcg64Mcg::seed_from_u64(1000 * draw + piece + 11);
-                let mut noise = Pcg64Mcg::seed_from_u64(1000 * draw + piece + 29);
+                let which = (draw % 2..own.starts.len()).step_by(2);
+                let mut rng = Pcg64Mcg::seed_from_u64(1000 * draw as u64 + piece + 11);
+                let mut noise = Pcg64Mcg::seed_from_u64(1000 * draw as u64 + piece + 29);
                 let mut draw = || -> Vector3<f64> {
                     Vector3::from_fn(|_, _| StandardNormal.sample(&mut noise))
                 };
@@ -203,8 +205,10 @@ impl<'a> Flown<'a> {
                     rng: &mut rng,
                 };
                 let mut still = clean.iter();
-                own.fly(Some(noise), |blown| {
-                    let Some(still) = still.next() else { return };
+                own.fly(which, Some(noise), |blown| {
+                    let Some(still) = still.find(|still| still.place() == blown.place()) else {
+                        return;
+                    };
                     let (own, other) = (&still.read, &blown.read);
                     let velocity = other.velocity_ned - own.velocity_ned
                         + draw().component_mul(&velocity_noise);
@@ -232,7 +236,8 @@ impl<'a> Flown<'a> {
         let square: Errors =
             segments.iter().map(|s| (s - mean).component_mul(&(s - mean))).sum::<Errors>() / n;
         // Segments overlap by half: each counts for half in the mean of one flight.
-        let deviation = (square * (2.0 * DRAWS as f64 / n)).map(f64::sqrt);
+        let flown: usize = self.pieces.iter().map(|(own, _)| own.starts.len()).sum();
+        let deviation = (square * (2.0 / flown.max(1) as f64)).map(f64::sqrt);
         Floor { mean: all, deviation }
     }
 }
@@ -269,6 +274,7 @@ fn compared(
 
 /// One bin of one segment.
 struct Bin {
+    segment: usize,
     /// In its segment.
     number: usize,
     /// Samples of the grid.
@@ -276,6 +282,12 @@ struct Bin {
     last: usize,
     read: Reading,
     acceleration_ned: Vector3<f64>,
+}
+
+impl Bin {
+    fn place(&self) -> (usize, usize) {
+        (self.segment, self.number)
+    }
 }
 
 /// The segments of a piece, ready to be flown again and again.
@@ -314,29 +326,33 @@ impl<'a> Segments<'a> {
         &self.predictor.tracks[self.piece]
     }
 
-    /// Flies every segment and hands over what the sensors would read, bin by bin.
-    fn fly(&self, mut noise: Option<Noise<'_>>, mut each: impl FnMut(Bin)) {
+    /// Flies segments in order and hands over what the sensors would read, bin by bin.
+    fn fly(
+        &self,
+        segments: impl Iterator<Item = usize>,
+        mut noise: Option<Noise<'_>>,
+        mut each: impl FnMut(Bin),
+    ) {
         let Some((first, _)) = self.starts.first() else { return };
         let (track, effects) = (self.track(), &self.hypothesis.effects);
         let mut clock = self.predictor.clock(track.flight, effects, track.time_s[*first]);
-        for (index, (start, state)) in self.starts.iter().enumerate() {
-            clock.advance_to(track.time_s[*start]);
-            let bins = if index % LONG_EVERY == 0 { BINS } else { COUNTED };
-            self.segment(*start, bins, *state, clock.clone(), &mut noise, &mut each);
+        for segment in segments {
+            clock.advance_to(track.time_s[self.starts[segment].0]);
+            self.segment(segment, clock.clone(), &mut noise, &mut each);
         }
     }
 
     fn segment(
         &self,
-        start: usize,
-        bins: usize,
-        mut state: PlantState,
+        segment: usize,
         mut clock: Clock<'_>,
         noise: &mut Option<Noise<'_>>,
         each: &mut impl FnMut(Bin),
     ) {
         let Self { predictor, plant, motion, per_bin, .. } = self;
         let (track, per_bin) = (self.track(), *per_bin);
+        let (start, mut state) = self.starts[segment];
+        let bins = if segment.is_multiple_of(LONG_EVERY) { BINS } else { COUNTED };
         let n = track.time_s.len();
         if start >= 4 && start + 4 < n {
             let weighted = START_WEIGHTS.iter().zip(&motion.body[start - 4..]);
@@ -412,14 +428,14 @@ impl<'a> Segments<'a> {
             };
             let acceleration_ned =
                 (state.body.velocity.vector - began) / (samples * track.period_s);
-            each(Bin { number: bin, first, last, read, acceleration_ned });
+            each(Bin { segment, number: bin, first, last, read, acceleration_ned });
         }
     }
 
     /// Adds what the sensors read in a bin, minus what they should have read.
     fn compare(
         &self,
-        Bin { number, first, last, read, acceleration_ned }: &Bin,
+        Bin { number, first, last, read, acceleration_ned, .. }: &Bin,
         all: &mut Errors12,
     ) {
         let track = self.track();

@@ -4,6 +4,9 @@
 use crate::predictor::{Motion, Predictor, Track};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
 
+/// The family of features by which an autopilot answers what disturbs it.
+pub(super) const THROTTLE: &str = "throttle";
+
 /// Parts of all flights, each left out once.
 const FOLDS: usize = 8;
 
@@ -132,7 +135,7 @@ pub(super) fn families(moments: &[Moment]) -> Vec<Family> {
                 w.y.abs(),
             ]
         }),
-        family("throttle", &|m| {
+        family(THROTTLE, &|m| {
             let u = m.throttle;
             vec![u, u * u, u.powi(3)]
         }),

@@ -13,7 +13,7 @@ pub(crate) mod floor;
 
 use crate::predictor::{CHANNELS, DYNAMIC, Motion, Predictor, Segment};
 pub(crate) use features::{Moment, moment};
-use features::{families, one_way, place_share, predicted_share};
+use features::{THROTTLE, families, one_way, place_share, predicted_share};
 use nalgebra::Matrix3;
 use squirrel_core::math::GRAVITY_M_S2;
 use std::ops::Range;
@@ -38,8 +38,10 @@ const LINE_SHARE: f64 = 0.35;
 /// Part of the variance that a family must predict for a leftover to go with it.
 const SHARE_MIN: f64 = 0.25;
 
-/// Part of the variance that a family may predict of gusts by chance.
+/// Part of the variance that a family may predict of gusts by chance, and throttle, by which the
+/// autopilot answers them.
 const GUST_SHARE_MAX: f64 = 0.45;
+const ANSWER_SHARE_MAX: f64 = 0.6;
 const PLACE_SHARE_MAX: f64 = 0.2;
 /// Gusts of 40 s have 0.54 to 0.70 of their power along one axis.
 const ONE_WAY_MAX: f64 = 0.85;
@@ -78,6 +80,9 @@ pub(crate) struct Leftover {
     /// Fourth moment of the slow part of the horizontal force, in units of its size by noise, over
     /// the square of its second: 3 for a normal distribution.
     pub(crate) kurtosis: f64,
+    /// What is slow in a force at moments at which gusts would leave least, over what is allowed
+    /// there: the most of the three axes. 0 where gusts are not in question.
+    pub(crate) between_gusts: f64,
     /// A line in the spectrum of the worst channel: frequency, Hz, and its part of the power above
     /// 0.5 Hz.
     pub(crate) line: Option<(f64, f64)>,
@@ -117,7 +122,10 @@ impl Leftover {
     /// Whether a family predicts so much of it, or it comes in such bursts, that it cannot be
     /// gusts.
     pub(crate) fn is_predicted(&self) -> bool {
-        self.families.first().is_some_and(|(_, share)| *share > GUST_SHARE_MAX)
+        let beyond_chance = |(name, share): &(&str, f64)| {
+            *share > if *name == THROTTLE { ANSWER_SHARE_MAX } else { GUST_SHARE_MAX }
+        };
+        self.families.iter().any(beyond_chance)
             || self.place_share > PLACE_SHARE_MAX
             || self.one_way > ONE_WAY_MAX
             || self.kurtosis > GUST_KURTOSIS_MAX
@@ -194,6 +202,8 @@ pub(crate) fn leftover(
 ) -> Leftover {
     let mut bands = Vec::new();
     let mut worst = [0.0_f64; DYNAMIC];
+    // What a model may get wrong in a channel, whatever noise there is.
+    let mut apart = [0.0_f64; DYNAMIC];
     for segment in predictor.segments.iter().filter(|s| is_judged(s)) {
         let rows = |all: &[f64]| all[segment.rows.clone()].to_vec();
         let own = rows(left);
@@ -229,6 +239,7 @@ pub(crate) fn leftover(
         let ratio = (band.slow / allowed(band.slow_floor, SLOW_RATIO, slow_usual))
             .max(band.whole / allowed(band.whole_floor, WHOLE_RATIO, whole_usual));
         worst[segment.channel] = worst[segment.channel].max(ratio);
+        apart[segment.channel] = apart[segment.channel].max(model_error.hypot(within));
         bands.push(band);
     }
     let mut excess: Vec<(usize, f64)> =
@@ -241,6 +252,17 @@ pub(crate) fn leftover(
         place_share: 0.0,
         one_way: 0.5,
         kurtosis: 3.0,
+        between_gusts: gusts.map_or(0.0, |gusts| {
+            let forces = 0..3;
+            let ratios = forces.map(|channel| {
+                let [usual, _] = slack.usual[channel];
+                let own = means(predictor, left, channel);
+                quiet_half(&own, &sizes(predictor, gusts, channel), |size| {
+                    (size.max(usual) * SLOW_RATIO).hypot(apart[channel])
+                })
+            });
+            ratios.fold(0.0, f64::max)
+        }),
         line: None,
         is_everywhere: false,
         is_in_all: false,
@@ -423,6 +445,15 @@ fn sizes(predictor: &Predictor, draws: &[Vec<f64>], channel: usize) -> Vec<f64> 
             (sum / (all.len() * around.len()) as f64).sqrt().max(f64::MIN_POSITIVE)
         })
         .collect()
+}
+
+/// Rms of the half of `y` at the smaller sizes, over what is allowed where the rms size is that one;
+/// 0 where there is nothing.
+fn quiet_half(y: &[f64], sizes: &[f64], allowed: impl Fn(f64) -> f64) -> f64 {
+    let mut both: Vec<(f64, f64)> = sizes.iter().copied().zip(y.iter().copied()).collect();
+    both.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (sizes, y): (Vec<f64>, Vec<f64>) = both[..both.len() / 2].iter().copied().unzip();
+    if y.is_empty() { 0.0 } else { rms(&y) / allowed(rms(&sizes)) }
 }
 
 fn kurtosis(y: &[f64]) -> f64 {

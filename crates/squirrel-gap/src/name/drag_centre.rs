@@ -52,7 +52,10 @@ pub(super) fn explain_wherever(
     catalogue.airframe.extend((0..3).map(|axis| (Airframe::DragCentre { axis }, sd_m)));
     let elsewhere = explain_thrusts(predictor, catalogue, progress)?;
     let search = Search { predictor, catalogue, gust_m_s: elsewhere.gust_m_s, progress };
-    if asked || search.leads_one_in_the_middle(&elsewhere, &naming)? {
+    // Names in calm air against none in gusts are told apart by what they leave: their noises
+    // differ.
+    let are_gusts = elsewhere.gust_m_s.is_some() && naming.leftover.is_real();
+    if asked || are_gusts || search.leads_one_in_the_middle(&elsewhere, &naming)? {
         return Ok(elsewhere);
     }
     catalogue.airframe.truncate(held);

@@ -82,6 +82,10 @@ fn with_gusts(
     if left.excess.iter().any(|(channel, ratio)| *ratio >= GUST_SCATTER || !blown_on(*channel)) {
         return Ok(None);
     }
+    // Folded wings hardly feel a gust: what is as large with them as with spread ones is none.
+    if left.between_gusts >= GUST_SCATTER {
+        return Ok(None);
+    }
     left.excess.clear();
     again.gust_m_s = Some(sigma);
     again.gust_nats = gust_nats(&calm);
