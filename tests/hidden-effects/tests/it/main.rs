@@ -3,6 +3,7 @@
 
 mod bench;
 mod flights;
+mod gusts;
 mod identify_then_fly;
 mod seen_by_find;
 mod squirrel_made;
