@@ -10,10 +10,13 @@
 
 mod features;
 pub(crate) mod floor;
+mod gusts;
 
 use crate::predictor::{CHANNELS, DYNAMIC, Motion, Predictor, Segment};
 pub(crate) use features::{Moment, moment};
-use features::{THROTTLE, families, one_way, place_share, predicted_share};
+use features::{families, one_way, place_share, predicted_share};
+pub(crate) use gusts::gusts;
+use gusts::{kurtosis, quiet_half, sizes};
 use nalgebra::Matrix3;
 use squirrel_core::math::GRAVITY_M_S2;
 use std::ops::Range;
@@ -21,11 +24,8 @@ use std::rc::Rc;
 
 /// Rows of the residual in one block: 0.27 s at 30 Hz.
 const BLOCK: usize = 8;
-/// Blocks on each side that size is averaged over: a second and a half in all.
-const NEIGHBOURS: usize = 2;
 /// Draws of the noise.
 const DRAWS: usize = 8;
-const GUST_DRAWS: usize = 40;
 /// How far above the noise's mean a channel may be, slow and as a whole, in rms.
 pub(crate) const SLOW_RATIO: f64 = 1.6;
 const WHOLE_RATIO: f64 = 1.25;
@@ -37,16 +37,6 @@ const LINE_CONTRAST: f64 = 6.0;
 const LINE_SHARE: f64 = 0.35;
 /// Part of the variance that a family must predict for a leftover to go with it.
 const SHARE_MIN: f64 = 0.25;
-
-/// Part of the variance that a family may predict of gusts by chance, and throttle, by which the
-/// autopilot answers them.
-const GUST_SHARE_MAX: f64 = 0.45;
-const ANSWER_SHARE_MAX: f64 = 0.6;
-const PLACE_SHARE_MAX: f64 = 0.2;
-/// Gusts of 40 s have 0.54 to 0.70 of their power along one axis.
-const ONE_WAY_MAX: f64 = 0.85;
-/// Gusts are about normal; what acts at one place or time comes in bursts.
-const GUST_KURTOSIS_MAX: f64 = 7.0;
 
 /// The leftover of one channel of one flight.
 #[derive(Debug, Clone)]
@@ -119,18 +109,6 @@ impl Leftover {
         }
     }
 
-    /// Whether a family predicts so much of it, or it comes in such bursts, that it cannot be
-    /// gusts.
-    pub(crate) fn is_predicted(&self) -> bool {
-        let beyond_chance = |(name, share): &(&str, f64)| {
-            *share > if *name == THROTTLE { ANSWER_SHARE_MAX } else { GUST_SHARE_MAX }
-        };
-        self.families.iter().any(beyond_chance)
-            || self.place_share > PLACE_SHARE_MAX
-            || self.one_way > ONE_WAY_MAX
-            || self.kurtosis > GUST_KURTOSIS_MAX
-    }
-
     /// Whether it goes with something that no form of any effect goes with: time, a place, a line
     /// in the spectrum.
     pub(crate) fn is_foreign(&self) -> bool {
@@ -155,17 +133,6 @@ pub(crate) fn noise(
     turbulence_m_s: f64,
 ) -> Vec<Vec<f64>> {
     floor::draws(predictor, wind_columns, turbulence_m_s, DRAWS)
-}
-
-/// What gusts leave, often enough for their size at each moment.
-///
-/// * arguments as of [`noise`]
-pub(crate) fn gusts(
-    predictor: &Predictor,
-    wind_columns: &[Vec<f64>; 3],
-    sigma_m_s: f64,
-) -> Vec<Vec<f64>> {
-    floor::draws(predictor, wind_columns, sigma_m_s, GUST_DRAWS)
 }
 
 /// The slow part of some channels that draws leave, by channel and piece, rms.
@@ -431,36 +398,6 @@ fn means(predictor: &Predictor, rows: &[f64], channel: usize) -> Vec<f64> {
     own.flat_map(|s| rows[s.rows.clone()].chunks_exact(BLOCK))
         .map(|block| block.iter().sum::<f64>() / BLOCK as f64)
         .collect()
-}
-
-/// How large draws are at each block of one channel: the rms of a block and its neighbours over all
-/// of them.
-fn sizes(predictor: &Predictor, draws: &[Vec<f64>], channel: usize) -> Vec<f64> {
-    let all: Vec<Vec<f64>> = draws.iter().map(|draw| means(predictor, draw, channel)).collect();
-    let n = all.first().map_or(0, Vec::len);
-    (0..n)
-        .map(|block| {
-            let around = block.saturating_sub(NEIGHBOURS)..(block + NEIGHBOURS + 1).min(n);
-            let sum: f64 = all.iter().flat_map(|m| &m[around.clone()]).map(|x| x * x).sum();
-            (sum / (all.len() * around.len()) as f64).sqrt().max(f64::MIN_POSITIVE)
-        })
-        .collect()
-}
-
-/// Rms of the half of `y` at the smaller sizes, over what is allowed where the rms size is that one;
-/// 0 where there is nothing.
-fn quiet_half(y: &[f64], sizes: &[f64], allowed: impl Fn(f64) -> f64) -> f64 {
-    let mut both: Vec<(f64, f64)> = sizes.iter().copied().zip(y.iter().copied()).collect();
-    both.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (sizes, y): (Vec<f64>, Vec<f64>) = both[..both.len() / 2].iter().copied().unzip();
-    if y.is_empty() { 0.0 } else { rms(&y) / allowed(rms(&sizes)) }
-}
-
-fn kurtosis(y: &[f64]) -> f64 {
-    let n = y.len().max(1) as f64;
-    let mean = y.iter().sum::<f64>() / n;
-    let moment = |power: i32| y.iter().map(|y| (y - mean).powi(power)).sum::<f64>() / n;
-    moment(4) / moment(2).powi(2).max(f64::MIN_POSITIVE)
 }
 
 fn rms(x: &[f64]) -> f64 {
