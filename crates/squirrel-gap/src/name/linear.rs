@@ -145,6 +145,18 @@ impl Linear {
         Ok(Self { point: point.clone(), whitener, raw, columns, tolerance, gram, near: !first })
     }
 
+    /// The same model of fewer channels.
+    ///
+    /// * `channels` - those that say nothing any more
+    pub(super) fn without(predictor: &Predictor, of: &Self, channels: &[usize]) -> Self {
+        let mut whitener = of.whitener.clone();
+        whitener.leave_out(channels);
+        let columns: Vec<Column> =
+            of.raw.iter().map(|c| whitener.apply_to(&predictor.segments, c)).collect();
+        let gram = inner(&columns.iter().collect::<Vec<_>>());
+        Self { whitener, columns, gram, ..of.clone() }
+    }
+
     fn is_about(&self, members: &[Member]) -> bool {
         members.iter().map(|m| m.candidate).eq(self.point.members.iter().map(|m| m.candidate))
     }

@@ -16,6 +16,7 @@ mod ahead;
 mod column;
 mod day;
 mod drag_centre;
+mod elsewhere;
 mod evidence;
 mod factor;
 mod forms;

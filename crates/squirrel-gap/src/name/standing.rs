@@ -1,6 +1,7 @@
 //! Which names stand: beside a model that misses a little everywhere, in flights that were held out,
 //! and clear of what the vehicle file has.
 
+use super::elsewhere::told_elsewhere;
 use super::point::Member;
 use super::search::{FURTHER_NATS, Search};
 use super::{Naming, only, slow};
@@ -42,7 +43,20 @@ pub(crate) fn standing(
     hold: impl Fn(&Naming) -> Result<Option<Vec<Held>>, GapError>,
 ) -> Result<Naming, GapError> {
     let naming = clear(search, slow::beside_drift(search, naming)?)?;
-    let naming = held(search, naming, &hold)?;
+    let naming = beside_leftover(search, held(search, naming, &hold)?, &hold)?;
+    let is_refused = naming.leftover.is_real() && naming.gust_m_s.is_none() && !naming.stands;
+    if !is_refused || naming.found.best.members.is_empty() {
+        return Ok(naming);
+    }
+    Ok(told_elsewhere(search, &naming, hold)?.unwrap_or(naming))
+}
+
+/// As [`standing`], by the channels that are left with something.
+fn beside_leftover(
+    search: &Search<'_>,
+    naming: Naming,
+    hold: &impl Fn(&Naming) -> Result<Option<Vec<Held>>, GapError>,
+) -> Result<Naming, GapError> {
     // What is left of forces alone, or of moments, may be one missing effect: names must explain
     // most of what is there.
     let most = |leftover: &Leftover| leftover.is_in_all || Left::of(leftover).share_removed >= MOST;
@@ -109,7 +123,7 @@ pub(crate) fn stands_beside_a_gap(
 }
 
 /// Whether every name is clear, and held-out flights, where there are any, want it.
-fn all_stand(search: &Search<'_>, naming: &Naming, holds: Option<&[Held]>) -> bool {
+pub(super) fn all_stand(search: &Search<'_>, naming: &Naming, holds: Option<&[Held]>) -> bool {
     holds.is_none_or(|holds| holds.iter().all(|held| held.better))
         && (0..naming.found.best.members.len())
             .all(|index| clearness(search, naming, holds, index) >= STANDS)

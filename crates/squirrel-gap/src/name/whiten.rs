@@ -80,6 +80,13 @@ impl Whitener {
         }
     }
 
+    /// Leaves channels out of all that follows.
+    pub(crate) fn leave_out(&mut self, channels: &[usize]) {
+        for channel in channels {
+            self.filters[*channel] = None;
+        }
+    }
+
     /// White noise of the size of what changes from one row to the next.
     pub(crate) fn white(segments: &[Segment], rows: &[f64]) -> Self {
         let mut changes = vec![0.0; rows.len()];
