@@ -4,7 +4,7 @@
 use super::search::Search;
 use super::{Naming, judge, slack};
 use crate::GapError;
-use crate::leftover::{Leftover, gusts, leftover, noise};
+use crate::leftover::{Band, Leftover, gusts, leftover, noise};
 use crate::predictor::TURBULENCE_M_S;
 
 /// Smallest and largest deviation that is called a gust, m/s; what asks for more is no gust.
@@ -12,6 +12,10 @@ pub(super) const GUST_M_S: (f64, f64) = (0.4, 3.2);
 
 /// How far above their mean the gusts of one flight may be.
 const GUST_SCATTER: f64 = 2.0;
+
+/// Part of the power of gusts, in a force that they act on, that those of one flight leave at least:
+/// of 24 flights one eighth.
+const LULL: f64 = 0.08;
 
 /// How many times the calm noise the noise of a channel must be for gusts to act on it.
 pub(super) const GUST_SHARE: f64 = 2.0;
@@ -82,8 +86,18 @@ fn with_gusts(
     if left.excess.iter().any(|(channel, ratio)| *ratio >= GUST_SCATTER || !blown_on(*channel)) {
         return Ok(None);
     }
-    // Folded wings hardly feel a gust: what is as large with them as with spread ones is none.
-    if left.between_gusts >= GUST_SCATTER {
+    // Folded wings hardly feel a gust: what is as large with them as with spread ones is none. And
+    // where gusts act, something is left: spread wings feel one that blows up or down.
+    let is_still = |channel: usize| {
+        let power = |of: &Leftover, rms: fn(&Band) -> f64| -> f64 {
+            let own = of.bands.iter().filter(|band| band.channel == channel);
+            own.map(|band| rms(band).powi(2)).sum()
+        };
+        let noise = power(&calm, |band| band.slow_floor);
+        let of_gusts = power(&left, |band| band.slow_floor) - noise;
+        power(&left, |band| band.slow) - noise < LULL * of_gusts
+    };
+    if left.between_gusts >= GUST_SCATTER || (0..3).any(|c| blown_on(c) && is_still(c)) {
         return Ok(None);
     }
     left.excess.clear();
