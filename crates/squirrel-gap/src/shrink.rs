@@ -199,6 +199,7 @@ impl<'a> Flown<'a> {
                     Vector3::from_fn(|_, _| StandardNormal.sample(&mut noise))
                 };
                 let noise = Noise {
+                    starts: starts(which.len(), &mut rng).into_iter(),
                     turbulence_m_s,
                     velocity_m_s: velocity_noise * track.velocity_smoothing(),
                     attitude_rad: attitude_noise,
@@ -242,12 +243,28 @@ impl<'a> Flown<'a> {
     }
 }
 
-/// What a flight is blown about with, and what its start state is off by.
+/// What a flight is blown about with, and what its start states are off by.
 struct Noise<'a> {
+    /// Of each segment: wind, velocity, attitude and rate, in units of their deviation.
+    starts: std::vec::IntoIter<[Vector3<f64>; 4]>,
     turbulence_m_s: f64,
     velocity_m_s: Vector3<f64>,
     attitude_rad: Vector3<f64>,
     rng: &'a mut Pcg64Mcg,
+}
+
+/// What so many segments start with. Each number has the mean square of as many as one likes, so
+/// that the mean error of a few is that of many.
+fn starts(count: usize, rng: &mut Pcg64Mcg) -> Vec<[Vector3<f64>; 4]> {
+    let mut all: Vec<[Vector3<f64>; 4]> = (0..count)
+        .map(|_| [(); 4].map(|()| Vector3::from_fn(|_, _| StandardNormal.sample(rng))))
+        .collect();
+    for part in 0..4 {
+        let square: Vector3<f64> = all.iter().map(|start| start[part].map(|x| x * x)).sum();
+        let deviation = (square / count.max(1) as f64).map(f64::sqrt);
+        all.iter_mut().for_each(|start| start[part].component_div_assign(&deviation));
+    }
+    all
 }
 
 /// Whether the attitude is the plant's own: it is the measured one where nothing is said of
@@ -362,17 +379,18 @@ impl<'a> Segments<'a> {
         let mut wind = Vector3::zeros();
         let mut turbulence = 0.0;
         if let Some(noise) = noise {
-            let mut draw =
-                || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(noise.rng)) };
+            let [air, velocity, attitude, rate] =
+                noise.starts.next().unwrap_or([Vector3::zeros(); 4]);
             turbulence = noise.turbulence_m_s;
-            wind = draw() * turbulence;
+            wind = air * turbulence;
             state.body.velocity =
-                In::new(state.body.velocity.vector + draw().component_mul(&noise.velocity_m_s));
-            let turn = UnitQuaternion::from_scaled_axis(draw().component_mul(&noise.attitude_rad));
+                In::new(state.body.velocity.vector + velocity.component_mul(&noise.velocity_m_s));
+            let turn =
+                UnitQuaternion::from_scaled_axis(attitude.component_mul(&noise.attitude_rad));
             state.body.attitude = (state.body.ned_from_body().quaternion * turn).into_inner();
             let [_, rate_noise] = track.imu_noise;
             state.body.omega =
-                In::new(state.body.omega.vector + draw().component_mul(&rate_noise) * START_NOISE);
+                In::new(state.body.omega.vector + rate.component_mul(&rate_noise) * START_NOISE);
         }
         let is_led = !flies_freely(predictor);
         let effects = &self.hypothesis.effects;

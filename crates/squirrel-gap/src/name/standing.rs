@@ -28,6 +28,8 @@ pub(crate) const CLEAR: f64 = 3.0;
 /// Part of what is above noise that names explain which leave something in forces alone, or in
 /// moments.
 const MOST: f64 = 0.5;
+/// The same of names of which none may fall for what they leave in one place.
+const NEARLY_ALL: f64 = 0.9;
 
 /// The explanation with those names alone that stand beside what the model misses everywhere, or
 /// with all of them where they stand beside what is slow in each flight; as it was where what is
@@ -48,7 +50,10 @@ pub(crate) fn standing(
     if !is_refused || naming.found.best.members.is_empty() {
         return Ok(naming);
     }
-    Ok(told_elsewhere(search, &naming, hold)?.unwrap_or(naming))
+    let nearly_all = Left::of(&naming.leftover).share_removed >= NEARLY_ALL;
+    let keeps = |told: &Naming| told.found.best.members.len() == naming.found.best.members.len();
+    let told = told_elsewhere(search, &naming, hold)?.filter(|told| !nearly_all || keeps(told));
+    Ok(told.unwrap_or(naming))
 }
 
 /// As [`standing`], by the channels that are left with something.
