@@ -180,6 +180,11 @@ impl Case {
             Set::Estimates => answer.recorder = Recorder::Estimator(Estimator::draw(&mut draw)),
             Set::Capture => answer.recorder = Recorder::Capture(Capture::draw(&mut draw)),
             Set::Misfit => answer.misfit = Some(Misfit::draw(&mut draw)),
+            Set::MisfitApart => {
+                // Each effect beside each place in three rounds.
+                let place = index + index / effects.len();
+                answer.misfit = Some(Misfit::draw(&mut draw).apart(place));
+            }
             Set::Inertial => answer.poor = Some(Poor::inertial()),
             Set::Poor => {
                 let poor = Poor::draw(index, &mut draw);
@@ -479,6 +484,12 @@ mod tests {
             let share = misfit.misfit.unwrap().share;
             assert!((0.1..0.25).contains(&share) && misfit.effects.len() == 1);
         }
+        let mut met = BTreeSet::new();
+        for index in 0..63 {
+            let Answer { effects, misfit, .. } = Case::draw(Set::MisfitApart, index, 1).answer;
+            met.insert((effects[0].name.clone(), misfit.unwrap().channels));
+        }
+        assert_eq!(met.len(), 63, "each effect beside each place");
         let stated = (0..32)
             .map(|index| Case::draw(Set::Overstated, index, 1).answer.stated.unwrap().effect.name);
         let names: BTreeSet<_> = stated.collect();

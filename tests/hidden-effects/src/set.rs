@@ -43,11 +43,14 @@ pub enum Set {
     Poor,
     /// No velocity, position or height: one effect that inertial unit and commands show, or nothing.
     Inertial,
+    /// One effect beside unmodelled, coloured forces and moments in one place alone: horizontal
+    /// force, vertical force, or moments.
+    MisfitApart,
 }
 
 impl Set {
     /// All sets with the number of cases of a full run.
-    pub const ALL: [(Self, usize); 17] = [
+    pub const ALL: [(Self, usize); 18] = [
         (Self::Single, 290),
         (Self::Two, 200),
         (Self::None, 300),
@@ -65,6 +68,7 @@ impl Set {
         (Self::Baseline, 116),
         (Self::Poor, 66),
         (Self::Inertial, 132),
+        (Self::MisfitApart, 63),
     ];
 
     /// Name as on the command line and in files.
@@ -87,6 +91,7 @@ impl Set {
             Self::Baseline => "baseline",
             Self::Poor => "poor",
             Self::Inertial => "inertial",
+            Self::MisfitApart => "misfit_apart",
         }
     }
 
@@ -136,7 +141,7 @@ impl Set {
         match self {
             Self::Capture => of(&CAPTURED),
             Self::Inertial => of(&FELT),
-            Self::Misfit => of(&BESIDE_MISFIT),
+            Self::Misfit | Self::MisfitApart => of(&BESIDE_MISFIT),
             // Gusts have no size that a file could state too large: what blows on one day is not
             // what blows on another.
             Self::Overstated => CATALOGUE.iter().filter(|entry| entry.name != "gust").collect(),
@@ -230,7 +235,7 @@ impl Generator {
         // Of an even number of forms or effects: the generators change places from one round to the
         // next.
         let turn = match set {
-            Set::Outside | Set::Misfit => return Self::Independent,
+            Set::Outside | Set::Misfit | Set::MisfitApart => return Self::Independent,
             Set::OtherForm => index + index / forms().len(),
             Set::Overstated => index + index / set.effects().len(),
             _ if set.is_half() => index / 2,

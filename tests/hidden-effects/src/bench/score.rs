@@ -146,6 +146,8 @@ pub(super) fn score(answer: &Answer, asked: Asked) -> Outcome {
             }
         }
         (Set::Capture | Set::Misfit, _) => outcome.first_right,
+        // What acts in that place alone may be taken for the rest of it.
+        (Set::MisfitApart, _) => outcome.first_right || word == Word::OutsideCatalogue,
         _ => outcome.exact,
     };
     if names_surely && answer.stated.is_none() {

@@ -31,6 +31,8 @@ pub struct Misfit {
     pub time_constant_s: f64,
     /// The function's numbers follow from it.
     pub seed: u64,
+    /// Which channels have it.
+    pub channels: [bool; 6],
 }
 
 /// Shares of the measured variation, within the tenth to quarter that models of real vehicles
@@ -49,7 +51,15 @@ impl Misfit {
             smooth_share: draw.uniform(0.4, 0.8),
             time_constant_s: draw.uniform(0.3, 1.5),
             seed: mix(draw.index(1 << 30) as u64, 0),
+            channels: [true; 6],
         }
+    }
+
+    /// The same in one place alone: horizontal force, vertical force, or moments.
+    pub(crate) fn apart(self, number: usize) -> Self {
+        let places = [0..2, 2..3, 3..6];
+        let place = &places[number % places.len()];
+        Self { channels: std::array::from_fn(|channel| place.contains(&channel)), ..self }
     }
 }
 
@@ -231,7 +241,8 @@ pub fn unmodelled(first: &Order<'_>, misfit: Misfit) -> Result<Unmodelled, Strin
     }
     let mut noise_sd = [0.0; 6];
     for (c, smooth) in smooth.iter_mut().enumerate() {
-        let size = misfit.share * seen.measured.sd(c);
+        let is_there = f64::from(u8::from(misfit.channels[c]));
+        let size = is_there * misfit.share * seen.measured.sd(c);
         smooth.mean = seen.smooth.mean(c);
         smooth.gain = misfit.smooth_share.sqrt() * size / seen.smooth.sd(c);
         noise_sd[c] = (1.0 - misfit.smooth_share).sqrt() * size;

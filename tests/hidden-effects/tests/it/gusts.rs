@@ -7,7 +7,7 @@ use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Verdict and names of a case.
-fn told(case: &Case) -> (Kind, Vec<&'static str>) {
+pub(super) fn told(case: &Case) -> (Kind, Vec<&'static str>) {
     let vehicle = VehicleFile::parse(&case.vehicle_toml(), "vehicle.toml").unwrap();
     let flight = |number: usize| -> (String, FlightLog) {
         (format!("flight {number}"), case.flight(number).unwrap())

@@ -5,6 +5,7 @@ mod bench;
 mod flights;
 mod gusts;
 mod identify_then_fly;
+mod misfit;
 mod seen_by_find;
 mod squirrel_made;
 mod twins;
