@@ -262,7 +262,9 @@ fn starts(count: usize, rng: &mut Pcg64Mcg) -> Vec<[Vector3<f64>; 4]> {
     for part in 0..4 {
         let square: Vector3<f64> = all.iter().map(|start| start[part].map(|x| x * x)).sum();
         let deviation = (square / count.max(1) as f64).map(f64::sqrt);
-        all.iter_mut().for_each(|start| start[part].component_div_assign(&deviation));
+        for start in &mut all {
+            start[part].component_div_assign(&deviation);
+        }
     }
     all
 }
