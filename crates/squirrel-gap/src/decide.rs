@@ -7,7 +7,8 @@
 //! | a little of what they explain | another form would do | `named_form_differs` |
 //! | a little everywhere, as models do, or what is slow in each flight | lead and hold on held-out flights | `named_incomplete` |
 //! | nothing, but a gap on held-out flights that names hardly shrink | the same | `named_incomplete` |
-//! | something of its own | - | `outside_catalogue` |
+//! | something of its own, beside names that other channels tell | the same | `named_incomplete` |
+//! | something of its own otherwise | - | `outside_catalogue` |
 
 use crate::find::Place;
 use crate::name::{BEHIND_NATS, INTERVAL, Member, NATS_MIN, Naming, STANDS, Scored, Search};
