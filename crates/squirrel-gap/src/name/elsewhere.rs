@@ -14,7 +14,8 @@ use crate::predictor::DYNAMIC;
 use std::rc::Rc;
 
 /// The explanation by the channels that are left with nothing, with those of its names that they
-/// ask for; `None` where they ask for none, or more is left without the others.
+/// ask for; `None` where they ask for none, or more is left without the others, or held-out flights
+/// do not want them.
 ///
 /// * `hold` - of each name, whether held-out flights want it; `None` where there are none
 ///
@@ -54,6 +55,8 @@ pub(super) fn told_elsewhere(
     if !told.leftover.excess.iter().all(is_missed) {
         return Ok(None);
     }
-    let stands = all_stand(search, &told, hold(&told)?.as_deref());
+    // Beside something that nobody knows, flights that were not fitted must want a name.
+    let holds = hold(&told)?;
+    let stands = holds.is_some() && all_stand(search, &told, holds.as_deref());
     Ok(stands.then_some(Naming { stands, ..told }))
 }

@@ -12,7 +12,8 @@ pub(super) fn told(case: &Case) -> (Kind, Vec<&'static str>) {
     let flight = |number: usize| -> (String, FlightLog) {
         (format!("flight {number}"), case.flight(number).unwrap())
     };
-    let found = diagnose(&vehicle, &[flight(0), flight(1)], &[], &|_| ()).unwrap().verdict;
+    let (flights, held_out) = ([flight(0), flight(1)], [flight(2)]);
+    let found = diagnose(&vehicle, &flights, &held_out, &|_| ()).unwrap().verdict;
     (found.verdict, found.effects.iter().map(|effect| effect.name).collect())
 }
 
