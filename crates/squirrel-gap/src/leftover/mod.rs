@@ -89,6 +89,13 @@ impl Leftover {
         !self.excess.is_empty()
     }
 
+    /// Mean square over all flights of something of a channel.
+    pub(crate) fn power(&self, channel: usize, of: fn(&Band) -> f64) -> f64 {
+        let own = self.bands.iter().filter(|band| band.channel == channel);
+        let (sum, n) = own.fold((0.0, 0.0_f64), |(sum, n), b| (sum + of(b).powi(2), n + 1.0));
+        sum / n.max(1.0)
+    }
+
     /// The largest ratio to what is allowed; 0 where nothing stands out.
     pub(crate) fn worst(&self) -> f64 {
         self.excess.first().map_or(0.0, |(_, ratio)| *ratio)
@@ -212,6 +219,15 @@ pub(crate) fn leftover(
     let mut excess: Vec<(usize, f64)> =
         worst.iter().copied().enumerate().filter(|(_, ratio)| *ratio > 1.0).collect();
     excess.sort_by(|a, b| b.1.total_cmp(&a.1));
+    // Of all draws at each moment: dear, and asked for where gusts or a leftover are in question.
+    let sizes_of = |channels: Range<usize>| -> Vec<Vec<f64>> {
+        channels.map(|channel| sizes(predictor, gusts.unwrap_or(draws), channel)).collect()
+    };
+    let of_forces = match (gusts, excess.is_empty()) {
+        (Some(_), _) => sizes_of(0..3),
+        (None, false) => sizes_of(0..2),
+        (None, true) => Vec::new(),
+    };
     let mut out = Leftover {
         bands,
         excess,
@@ -219,12 +235,10 @@ pub(crate) fn leftover(
         place_share: 0.0,
         one_way: 0.5,
         kurtosis: 3.0,
-        between_gusts: gusts.map_or(0.0, |gusts| {
-            let forces = 0..3;
-            let ratios = forces.map(|channel| {
+        between_gusts: gusts.map_or(0.0, |_| {
+            let ratios = of_forces.iter().enumerate().map(|(channel, sizes)| {
                 let [usual, _] = slack.usual[channel];
-                let own = means(predictor, left, channel);
-                quiet_half(&own, &sizes(predictor, gusts, channel), |size| {
+                quiet_half(&means(predictor, left, channel), sizes, |size| {
                     (size.max(usual) * SLOW_RATIO).hypot(apart[channel])
                 })
             });
@@ -239,14 +253,9 @@ pub(crate) fn leftover(
         let moments = moments_of(predictor, motions, channel);
         out.families =
             families(&moments).iter().map(|f| (f.name, predicted_share(f, &y))).collect();
-        let gusts = gusts.unwrap_or(draws);
         let [x, y] = [0, 1].map(|channel| -> Vec<f64> {
-            let sizes = sizes(predictor, gusts, channel);
-            means(predictor, left, channel)
-                .iter()
-                .zip(sizes)
-                .map(|(force, size)| force / size)
-                .collect()
+            let own = means(predictor, left, channel);
+            own.iter().zip(&of_forces[channel]).map(|(force, size)| force / size).collect()
         });
         let horizontal = moments_of(predictor, motions, 0);
         out.place_share = place_share(&horizontal, [&x, &y]);
@@ -353,11 +362,7 @@ fn centred(x: &[f64]) -> Vec<f64> {
 
 /// Whether a model misses something in a channel: it stands out, or is well above noise.
 fn misses_in(found: &Leftover, channel: usize) -> bool {
-    let rms_of = |of: fn(&Band) -> f64| {
-        let own = found.bands.iter().filter(|b| b.channel == channel);
-        let (sum, n) = own.fold((0.0, 0.0_f64), |(sum, n), b| (sum + of(b).powi(2), n + 1.0));
-        (sum / n.max(1.0)).sqrt()
-    };
+    let rms_of = |of: fn(&Band) -> f64| found.power(channel, of).sqrt();
     let floor = rms_of(|b| b.slow_floor);
     let stands_out = found.excess.iter().any(|(other, _)| *other == channel);
     stands_out || (floor > 0.0 && rms_of(|b| b.slow) > MISSED * floor)

@@ -4,7 +4,7 @@
 use super::search::Search;
 use super::{Naming, judge, slack};
 use crate::GapError;
-use crate::leftover::{Band, Leftover, gusts, leftover, noise};
+use crate::leftover::{Leftover, gusts, leftover, noise};
 use crate::predictor::TURBULENCE_M_S;
 
 /// Smallest and largest deviation that is called a gust, m/s; what asks for more is no gust.
@@ -89,13 +89,9 @@ fn with_gusts(
     // Folded wings hardly feel a gust: what is as large with them as with spread ones is none. And
     // where gusts act, something is left: spread wings feel one that blows up or down.
     let is_still = |channel: usize| {
-        let power = |of: &Leftover, rms: fn(&Band) -> f64| -> f64 {
-            let own = of.bands.iter().filter(|band| band.channel == channel);
-            own.map(|band| rms(band).powi(2)).sum()
-        };
-        let noise = power(&calm, |band| band.slow_floor);
-        let of_gusts = power(&left, |band| band.slow_floor) - noise;
-        power(&left, |band| band.slow) - noise < LULL * of_gusts
+        let noise = calm.power(channel, |band| band.slow_floor);
+        let of_gusts = left.power(channel, |band| band.slow_floor) - noise;
+        left.power(channel, |band| band.slow) - noise < LULL * of_gusts
     };
     if left.between_gusts >= GUST_SCATTER || (0..3).any(|c| blown_on(c) && is_still(c)) {
         return Ok(None);
