@@ -12,15 +12,15 @@ mod features;
 pub(crate) mod floor;
 mod gusts;
 
-use crate::predictor::{CHANNELS, DYNAMIC, Motion, Predictor, Segment};
+use crate::predictor::{CHANNELS, DYNAMIC, Hypothesis, Motion, Predictor, Segment};
 pub(crate) use features::{Moment, moment};
 use features::{families, one_way, place_share, predicted_share};
 pub(crate) use gusts::gusts;
 use gusts::{kurtosis, quiet_half, sizes};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
+use squirrel_core::effects::Acting;
 use squirrel_core::math::GRAVITY_M_S2;
 use std::ops::Range;
-use std::rc::Rc;
 
 /// Rows of the residual in one block: 0.27 s at 30 Hz.
 const BLOCK: usize = 8;
@@ -159,7 +159,7 @@ pub(crate) fn slow_parts(
 /// Compares a leftover with what noise alone leaves.
 ///
 /// * `left`, `nominal` - rows of the residual of the best explanation, and of the vehicle as it is
-/// * `motions` - of each piece, under the best explanation
+/// * `about` - the best explanation
 /// * `draws` - what noise alone leaves, of [`noise`]
 /// * `gusts` - what gusts would leave, of [`gusts`], where they are in question: bursts and places
 ///   are looked for in units of their size at each moment, as spread wings feel many times the gust
@@ -167,7 +167,7 @@ pub(crate) fn slow_parts(
 /// * `slack` - tolerances that no column of the model stands for
 pub(crate) fn leftover(
     predictor: &Predictor,
-    motions: &[Rc<Motion>],
+    about: &Hypothesis,
     left: &[f64],
     nominal: &[f64],
     draws: &[Vec<f64>],
@@ -204,7 +204,7 @@ pub(crate) fn leftover(
             whole_floor: mean(rms),
             slow_measured: rms_of_means(&about_mean),
         };
-        let within = within_tolerance(predictor, &motions[segment.piece], segment, slack);
+        let within = within_tolerance(predictor, &predictor.motion(segment.piece, about), segment, slack);
         let [slow_usual, whole_usual] = slack.usual[segment.channel];
         let model_error = MODEL_ERROR * rms_of_means(&explained);
         let allowed = |floor: f64, ratio: f64, usual: f64| {
@@ -250,14 +250,14 @@ pub(crate) fn leftover(
     };
     if let Some(&(channel, _)) = out.excess.first() {
         let y = means(predictor, left, channel);
-        let moments = moments_of(predictor, motions, channel);
+        let moments = moments_of(predictor, about, channel);
         out.families =
             families(&moments).iter().map(|f| (f.name, predicted_share(f, &y))).collect();
         let [x, y] = [0, 1].map(|channel| -> Vec<f64> {
             let own = means(predictor, left, channel);
             own.iter().zip(&of_forces[channel]).map(|(force, size)| force / size).collect()
         });
-        let horizontal = moments_of(predictor, motions, 0);
+        let horizontal = moments_of(predictor, about, 0);
         out.place_share = place_share(&horizontal, [&x, &y]);
         out.one_way = one_way(&horizontal, [&x, &y]);
         if channel < 2 {
@@ -385,13 +385,20 @@ fn is_everywhere(predictor: &Predictor, left: &[f64], found: &Leftover, group: u
     correlation.symmetric_eigenvalues().max() < 3.0 * ONE_CAUSE
 }
 
-/// The moments of the blocks of one channel.
-fn moments_of(predictor: &Predictor, motions: &[Rc<Motion>], channel: usize) -> Vec<Moment> {
+/// The moments of the blocks of one channel, in the air that an explanation has: what pushes a
+/// vehicle goes with its motion through that.
+fn moments_of(predictor: &Predictor, about: &Hypothesis, channel: usize) -> Vec<Moment> {
+    let acting = Acting::new(&about.effects, &about.vehicle);
     let mut moments = Vec::new();
     for segment in predictor.segments.iter().filter(|s| s.channel == channel) {
-        let track = &predictor.tracks[segment.piece];
+        let (track, motion) =
+            (&predictor.tracks[segment.piece], predictor.motion(segment.piece, about));
         for i in 0..segment.rows.len() / BLOCK {
-            moments.push(moment(predictor, track, &motions[segment.piece], i * BLOCK, BLOCK));
+            let mut moment = moment(predictor, track, &motion, i * BLOCK, BLOCK);
+            let [north, east] = acting.numbers().wind(acting.present(), -moment.position.z);
+            moment.velocity_body -=
+                moment.ned_from_body.tr_mul(&Vector3::new(north, east, 0.0));
+            moments.push(moment);
         }
     }
     moments

@@ -113,13 +113,11 @@ fn blown(
     sizes: f64,
 ) -> Result<Leftover, GapError> {
     let predictor = search.predictor;
-    let wind = predictor.wind_columns(&naming.hypothesis)?;
-    let motions: Vec<_> = (0..predictor.tracks.len())
-        .map(|piece| predictor.motion(piece, &naming.hypothesis))
-        .collect();
+    let about = &naming.hypothesis;
+    let wind = predictor.wind_columns(about)?;
     let (draws, gusts) = (noise(predictor, &wind, sigma), gusts(predictor, &wind, sizes));
     let slack = slack(search, &naming.found);
-    Ok(leftover(predictor, &motions, &naming.left, &naming.nominal, &draws, Some(&gusts), slack))
+    Ok(leftover(predictor, about, &naming.left, &naming.nominal, &draws, Some(&gusts), slack))
 }
 
 /// The deviation of gusts that would make the leftover of the horizontal force, m/s; `None` where

@@ -58,9 +58,8 @@ pub(crate) use tolerance::{notes as silent_tolerances, sds};
 use crate::GapError;
 use crate::leftover::{Leftover, Slack, leftover, noise};
 pub(crate) use crate::predictor::TURBULENCE_M_S;
-use crate::predictor::{Hypothesis, Motion, Predictor};
+use crate::predictor::{Hypothesis, Predictor};
 use squirrel_core::effects::Timing;
-use std::rc::Rc;
 
 pub(crate) const BEHIND_NATS: f64 = 3.0;
 /// 95 % of a normal distribution lies within this many standard deviations.
@@ -129,8 +128,10 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     }
     // Where little is known, a looser fit of what is seen well may be a worse one of the rest.
     let loose = loosened(&found, &point, left.clone());
-    let seen = Surroundings::of(search, &about)?;
-    let judged = |left: &[f64]| left_over(search, &found, &seen, left, &nominal);
+    let wind = predictor.wind_columns(&about)?;
+    let draws = noise(predictor, &wind, search.gust_m_s.unwrap_or(TURBULENCE_M_S));
+    let slack = slack(search, &found);
+    let judged = |left: &[f64]| leftover(predictor, &about, left, &nominal, &draws, None, slack);
     let (left, leftover) = match (judged(&left), judged(&loose)) {
         (as_it_is, looser) if as_it_is.worst() < looser.worst() => (left, as_it_is),
         (_, looser) => (loose, looser),
@@ -147,34 +148,6 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
         gust_nats: 0.0,
         stands: false,
     })
-}
-
-/// How flights move under a hypothesis, and what noise and turbulence leave of them.
-struct Surroundings {
-    motions: Vec<Rc<Motion>>,
-    draws: Vec<Vec<f64>>,
-}
-
-impl Surroundings {
-    fn of(search: &Search<'_>, about: &Hypothesis) -> Result<Self, GapError> {
-        let predictor = search.predictor;
-        let motions =
-            (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, about)).collect();
-        let wind = predictor.wind_columns(about)?;
-        let draws = noise(predictor, &wind, search.gust_m_s.unwrap_or(TURBULENCE_M_S));
-        Ok(Self { motions, draws })
-    }
-}
-
-/// What an explanation leaves, against noise and turbulence.
-fn left_over(
-    search: &Search<'_>,
-    found: &Found,
-    Surroundings { motions, draws }: &Surroundings,
-    left: &[f64],
-    nominal: &[f64],
-) -> Leftover {
-    leftover(search.predictor, motions, left, nominal, draws, None, slack(search, found))
 }
 
 /// Tolerances beside the catalogue's; a named clock means that commands were logged on it, a sample

@@ -149,14 +149,17 @@ fn clearness(search: &Search<'_>, naming: &Naming, holds: Option<&[Held]>, index
 /// # Errors
 /// What the predictor says.
 fn clear(search: &Search<'_>, naming: Naming) -> Result<Naming, GapError> {
-    dropping(search, naming, |naming| Ok(search.least_clear(naming)))
+    dropping(search, naming, |naming| {
+        Ok(search.least_clear(naming).filter(|_| !naming.leftover.is_real()))
+    })
 }
 
-/// An explanation that leaves nothing without those names that held-out flights are predicted
-/// better without and speak against more than the others spoke for them, the one worth least first.
+/// An explanation without those names that held-out flights are predicted better without and speak
+/// against more than the others spoke for them, the one worth least first. Where something is left,
+/// the last one stays.
 ///
 /// # Errors
-/// What the predictor says.
+/// What the predictor and `hold` say.
 fn held(
     search: &Search<'_>,
     naming: Naming,
@@ -164,14 +167,16 @@ fn held(
 ) -> Result<Naming, GapError> {
     dropping(search, naming, |naming| {
         let members = &naming.found.best.members;
-        if members.is_empty() {
+        let is_left = naming.leftover.is_real();
+        if members.len() <= usize::from(is_left) {
             return Ok(None);
         }
         let Some(holds) = hold(naming)? else { return Ok(None) };
         let worth = |i: &usize| naming.found.worth(*i);
         let falls = (0..members.len()).filter(|i| {
-            // What is clear is told with the flights that lack it, and is no accident of some.
-            worth(i) < FURTHER_NATS
+            // What is clear is told with the flights that lack it, and is no accident of some; but
+            // beside something that nobody knows nothing is.
+            (is_left || worth(i) < FURTHER_NATS)
                 && !holds[*i].better
                 && worth(i) + holds[*i].nats < search.needed(&members[*i])
         });
@@ -179,8 +184,8 @@ fn held(
     })
 }
 
-/// An explanation without the names that are pointed at, one after the other, as long as nothing is
-/// left for that.
+/// An explanation without the names that are pointed at, one after the other, as long as no other
+/// channel is left with something, or what is left most shrinks.
 ///
 /// * `weakest` - which of the members falls next, if any
 ///
@@ -191,12 +196,16 @@ fn dropping(
     mut naming: Naming,
     weakest: impl Fn(&Naming) -> Result<Option<usize>, GapError>,
 ) -> Result<Naming, GapError> {
-    while !naming.leftover.is_real() && naming.gust_m_s.is_none() {
+    while naming.gust_m_s.is_none() {
         let Some(weakest) = weakest(&naming)? else { break };
         let mut kept = naming.found.best.members.clone();
         kept.remove(weakest);
         let fewer = only(search, &naming, &kept)?;
-        if fewer.leftover.is_real() {
+        let stood_out = |(channel, _): &(usize, f64)| {
+            naming.leftover.excess.iter().any(|(other, _)| other == channel)
+        };
+        let is_less = fewer.leftover.worst() < naming.leftover.worst();
+        if !is_less && !fewer.leftover.excess.iter().all(stood_out) {
             break;
         }
         naming = fewer;

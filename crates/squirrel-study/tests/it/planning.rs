@@ -99,8 +99,9 @@ fn a_planner_comes_through_the_forest_in_its_band() {
         let m = pilot::fly(&setup, false, |_| {}).unwrap().metrics;
         m.path_m >= 400.0 && m.contact_s.is_none() && m.height_lost_m.max(m.height_gained_m) < 3.0
     };
-    let count = (1..=3).filter(through).count();
-    assert!(count >= 2, "{count} of 3");
+    // Two of three: the third is flown where one is lost.
+    let count = (1..=3).filter(through).take(2).count();
+    assert_eq!(count, 2, "of 3");
 }
 
 #[test]
