@@ -204,7 +204,8 @@ pub(crate) fn leftover(
             whole_floor: mean(rms),
             slow_measured: rms_of_means(&about_mean),
         };
-        let within = within_tolerance(predictor, &predictor.motion(segment.piece, about), segment, slack);
+        let within =
+            within_tolerance(predictor, &predictor.motion(segment.piece, about), segment, slack);
         let [slow_usual, whole_usual] = slack.usual[segment.channel];
         let model_error = MODEL_ERROR * rms_of_means(&explained);
         let allowed = |floor: f64, ratio: f64, usual: f64| {
@@ -396,8 +397,7 @@ fn moments_of(predictor: &Predictor, about: &Hypothesis, channel: usize) -> Vec<
         for i in 0..segment.rows.len() / BLOCK {
             let mut moment = moment(predictor, track, &motion, i * BLOCK, BLOCK);
             let [north, east] = acting.numbers().wind(acting.present(), -moment.position.z);
-            moment.velocity_body -=
-                moment.ned_from_body.tr_mul(&Vector3::new(north, east, 0.0));
+            moment.velocity_body -= moment.ned_from_body.tr_mul(&Vector3::new(north, east, 0.0));
             moments.push(moment);
         }
     }

@@ -47,7 +47,9 @@ pub(crate) fn standing(
     let naming = clear(search, slow::beside_drift(search, naming)?)?;
     let naming = beside_leftover(search, held(search, naming, &hold)?, &hold)?;
     let is_refused = naming.leftover.is_real() && naming.gust_m_s.is_none() && !naming.stands;
-    if !is_refused || naming.found.best.members.is_empty() {
+    // What goes with the time of a flight or with a place is another effect, for which names stand
+    // in elsewhere, too: thrust that falls as motors warm up is a smaller one to moments.
+    if !is_refused || naming.leftover.is_foreign() || naming.found.best.members.is_empty() {
         return Ok(naming);
     }
     let nearly_all = Left::of(&naming.leftover).share_removed >= NEARLY_ALL;

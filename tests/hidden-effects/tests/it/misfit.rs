@@ -22,3 +22,16 @@ fn a_horizontal_force_without_a_vertical_one_is_no_gust_to_spread_wings() {
     let (verdict, names) = told(&case);
     assert!(verdict == Kind::NamedIncomplete && names == ["motor_lag"], "{verdict:?} {names:?}");
 }
+
+/// Motors that warm up lose thrust: moments alone ask for a smaller thrust coefficient, and what is
+/// left of the force goes with time.
+#[test]
+fn what_changes_in_flight_is_no_constant_to_other_channels() {
+    let case = Case::draw(Set::Outside, 16, 88181);
+    assert_eq!(
+        case.answer.outside.map(|outside| outside.name()).as_deref(),
+        Some("thrust_heating")
+    );
+    let (verdict, _) = told(&case);
+    assert_eq!(verdict, Kind::OutsideCatalogue);
+}
