@@ -143,7 +143,7 @@ pub(crate) fn decide(
         if fails { Kind::OutsideCatalogue } else { Kind::NamedIncomplete }
     } else if leftover.is_real() {
         let shrinks = gap.as_ref().is_none_or(|gap| gap.removed_fraction > FORM_REMOVED);
-        if naming.stands && close.is_empty() && !fails {
+        if naming.stands && close.is_empty() {
             Kind::NamedIncomplete
         } else if share < FORM_SHARE
             && !leftover.is_foreign()
@@ -155,7 +155,7 @@ pub(crate) fn decide(
                 (false, true) => Kind::NamedIncomplete,
                 (false, false) => Kind::Ambiguous,
             }
-        } else if naming.stands && !fails {
+        } else if naming.stands {
             Kind::Ambiguous
         } else {
             Kind::OutsideCatalogue

@@ -71,15 +71,9 @@ fn a_planner_is_an_arm() {
     let folder = Folder::new("planner");
     let text = folder.succeeds(&["fly", "--scenario", "hover", "--arm", "plan_wings"]);
     assert!(text.contains("plan_wings"), "{text}");
-    let table = folder.succeeds(&[
-        "study",
-        "table3",
-        "--trials",
-        "1",
-        "--arms",
-        "plan_wings,plan_no_wings",
-    ]);
-    assert!(table.contains("plan_wings") && table.contains("plan_no_wings"), "{table}");
+    let study = ["study", "table3", "--trials", "1", "--arms", "plan_no_wings"];
+    let table = folder.succeeds(&study);
+    assert!(table.contains("plan_no_wings"), "{table}");
 }
 
 #[test]

@@ -235,16 +235,16 @@ fn a_mistake_in_one_log_sets_its_flight_aside() {
         &[("[limits]", "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.2\n\n[limits]")],
     );
     let case = Case::flown_by(&draggy);
-    for (_, channel, mistake) in &MISTAKES[..4] {
-        let (mut second, mut held_out) = (case.clone(), case.clone());
-        mistake(&mut second.flights[1].1);
-        mistake(&mut held_out.held_out[0].1);
-        for (case, flight) in [(second, "second"), (held_out, "held-out")] {
-            let verdict = case.verdict();
-            assert_aside(&verdict, flight, channel);
-            assert_eq!(names(&verdict), ["linear_drag"], "{}", verdict.words);
-            assert_eq!(verdict.gap.is_some(), flight == "second", "no flight is held out any more");
-        }
+    for ((_, channel, mistake), flight) in
+        MISTAKES[..4].iter().zip(["second", "held-out"].into_iter().cycle())
+    {
+        let mut case = case.clone();
+        let of = if flight == "second" { &mut case.flights[1] } else { &mut case.held_out[0] };
+        mistake(&mut of.1);
+        let verdict = case.verdict();
+        assert_aside(&verdict, flight, channel);
+        assert_eq!(names(&verdict), ["linear_drag"], "{}", verdict.words);
+        assert_eq!(verdict.gap.is_some(), flight == "second", "no flight is held out any more");
     }
 }
 
