@@ -261,11 +261,13 @@ fn what_is_added_leaves_the_file_as_it_was() {
         "w.json",
     ];
     let why = "squirrel: nothing to add: no effect is above its tolerance";
-    let output = folder.run(&[&["gap", "add"], &none[..]].concat());
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{stderr}");
-    assert_eq!(stderr.lines().last(), Some(format!("error: {why}").as_str()), "{stderr}");
-    assert_eq!(json(&folder, "w.json")["verdict"], "none");
+    for dry_run in [&["--dry-run"][..], &[]] {
+        let output = folder.run(&[&["gap", "add"], &none[..], dry_run].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{stderr}");
+        assert_eq!(stderr.lines().last(), Some(format!("error: {why}").as_str()), "{stderr}");
+        assert_eq!(json(&folder, "w.json")["verdict"], "none");
+    }
     let said = folder.succeeds(&[&["gap", "run"], &none[..]].concat());
     assert!(said.lines().any(|line| line == why), "{said}");
     assert!(!folder.0.join("more/squirrel.toml").exists(), "no patch");

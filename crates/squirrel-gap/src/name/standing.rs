@@ -152,7 +152,10 @@ fn clearness(search: &Search<'_>, naming: &Naming, holds: Option<&[Held]>, index
 /// What the predictor says.
 fn clear(search: &Search<'_>, naming: Naming) -> Result<Naming, GapError> {
     dropping(search, naming, |naming| {
-        Ok(search.least_clear(naming).filter(|_| !naming.leftover.is_real()))
+        if naming.leftover.is_real() {
+            return Ok(None);
+        }
+        Ok(search.least_clear(naming))
     })
 }
 
