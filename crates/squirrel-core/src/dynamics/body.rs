@@ -4,7 +4,7 @@
 //! quaternions `[w, x, y, z]`.
 
 use crate::lane::Lane;
-use crate::lane::vector::{cross, minus, scaled, times};
+use crate::lane::vector::{cross, minus, plus, scaled, times};
 use crate::math::GRAVITY_M_S2;
 
 /// Acceleration over ground, world frame, m/s^2.
@@ -35,6 +35,21 @@ pub fn angular_acceleration<L: Lane>(
 ) -> [L; 3] {
     let gyroscopic = cross(omega, &times(inertia, omega));
     times(inertia_inverse, &minus(moment, &gyroscopic))
+}
+
+/// Specific force beside the centre of mass, body frame, m/s^2: `f / m + w' x r + w x (w x r)`.
+///
+/// * `centre` - at it
+/// * `omega`, `omega_dot` - rad/s and rad/s^2
+/// * `place_m` - from it
+#[inline(always)]
+pub fn specific_force<L: Lane>(
+    centre: &[L; 3],
+    [omega, omega_dot]: [&[L; 3]; 2],
+    place_m: &[L; 3],
+) -> [L; 3] {
+    let turning = cross(omega, &cross(omega, place_m));
+    plus(centre, &plus(&cross(omega_dot, place_m), &turning))
 }
 
 /// Rate of the attitude, 1/s.

@@ -328,9 +328,10 @@ pub fn specific_force<T: Real>(
     if !effects.any() {
         return centre;
     }
-    let (w, r) = (omega.vector, effects.accelerometer_position().vector);
-    let omega_dot = angular_acceleration(vehicle, omega, wrench).vector;
-    centre + In::new(omega_dot.cross(&r) + w.cross(&w.cross(&r)))
+    let omega_dot = angular_acceleration(vehicle, omega, wrench).vector.into();
+    let place_m = effects.accelerometer_position().vector.into();
+    let rates = [&omega.vector.into(), &omega_dot];
+    In::new(Vector3::from(body::specific_force(&centre.vector.into(), rates, &place_m)))
 }
 
 #[cfg(test)]

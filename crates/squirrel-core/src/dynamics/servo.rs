@@ -3,6 +3,7 @@
 
 use crate::lane::Lane;
 use crate::lane::functions::{exp, sign, size};
+use crate::math::{Real, real};
 use crate::numbers;
 
 /// A lag that no step resolves, s.
@@ -80,7 +81,27 @@ impl<L: Lane> ServoState<L> {
     }
 }
 
-impl<T: crate::math::Real> ServoState<T> {
+impl<T: Real> Servo<T> {
+    /// [`Self::lead`] of one number, with its bits; in no time where nothing but the lag acts.
+    #[inline]
+    pub fn lead_one(&self, state: &mut ServoState<T>, dt: T) -> T {
+        let ServoState { deployment: start, target, waiting, wait_s } = *state;
+        let gap = target - start;
+        let [time_constant, keep] = if gap < T::zero() {
+            [self.closing_s, self.keep_closing]
+        } else {
+            [self.opening_s, self.keep_opening]
+        };
+        let waits = wait_s > T::zero() || waiting != target;
+        if waits || !(gap.abs() <= self.rate_max_per_s * time_constant) {
+            return self.lead(state, dt);
+        }
+        state.deployment = target - gap * keep;
+        (start + state.deployment) * real(0.5)
+    }
+}
+
+impl<T: Real> ServoState<T> {
     /// Tells it where to go; a command that changes again within the dead time replaces the one
     /// that waits.
     pub fn ask(&mut self, command: T, dead_time_s: T) {
@@ -88,10 +109,5 @@ impl<T: crate::math::Real> ServoState<T> {
             self.waiting = command;
             self.wait_s = dead_time_s;
         }
-    }
-
-    /// Whether a command leaves it where it is, for any time.
-    pub fn rests(&self, command: T) -> bool {
-        self.waiting == self.target && self.deployment == self.target && command == self.target
     }
 }

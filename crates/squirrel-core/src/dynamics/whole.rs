@@ -6,7 +6,7 @@
 
 use super::lanes::{Airframe, Held, Motion, airflow, body_rate, plus_scaled, rotor_rates, rotors};
 use super::rotors::spin;
-use super::{Surroundings, with_effects};
+use super::{Surroundings, body, with_effects};
 use crate::aero::membrane::{Membrane, Side};
 use crate::aero::{Airflow, BodyWrench, drag, flat_plate};
 use crate::effects::{PendulumState, Prepared, Present, Swing};
@@ -47,6 +47,27 @@ pub struct Whole<L: Lane, const ROTORS: usize> {
     pub deployment: [L; 2],
     /// Rate of the angle of attack of each side, rad/s, held over a step.
     pub angle_rate: [L; 2],
+}
+
+impl<L: Lane, const ROTORS: usize> Whole<L, ROTORS> {
+    /// The same on other lanes.
+    #[inline(always)]
+    pub fn map<M: Lane>(&self, f: impl Fn(L) -> M) -> Whole<M, ROTORS> {
+        Whole {
+            airframe: self.airframe.map(&f),
+            held: self.held.map(&f),
+            air_omega: self.air_omega.map(|air_omega| air_omega.map(&f)),
+            plate: self.plate.map(&f),
+            membrane: self.membrane.map(&f),
+            present: self.present,
+            effects: self.effects.map(&f),
+            spin: self.spin.map(&f),
+            swing: self.swing.map(&f),
+            load: self.load.map(&f),
+            deployment: self.deployment.map(&f),
+            angle_rate: self.angle_rate.map(&f),
+        }
+    }
 }
 
 /// One step: the motion and the membranes at its end. Servos, battery, load and air are stepped
@@ -118,9 +139,27 @@ fn derivative<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>
     state: &Motion<L, ROTORS>,
     sides: &[Side<L>; 2],
 ) -> (Motion<L, ROTORS>, [Side<L>; 2]) {
-    let none = L::of(0.0);
     let columns = rotation(&state.attitude);
-    let air = air::<L, ROTORS, EFFECTS>(whole, state, &columns);
+    let rotor_rate = rotor_rates(&whole.airframe, &whole.held, &state.rotor_speed);
+    let (sum, sides_rate) =
+        wrench::<L, ROTORS, WING, EFFECTS>(whole, state, sides, &columns, &rotor_rate);
+    (body_rate(&whole.airframe, state, &columns, &sum, rotor_rate), sides_rate)
+}
+
+/// Force and moment without gravity, body frame, and the rates of the membranes.
+///
+/// * `columns` - the attitude's rotation to the world
+/// * `rotor_rate` - of the rotor speeds, rad/s^2
+#[inline(always)]
+fn wrench<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>(
+    whole: &Whole<L, ROTORS>,
+    state: &Motion<L, ROTORS>,
+    sides: &[Side<L>; 2],
+    columns: &[[L; 3]; 3],
+    rotor_rate: &[L; ROTORS],
+) -> (BodyWrench<L>, [Side<L>; 2]) {
+    let none = L::of(0.0);
+    let air = air::<L, ROTORS, EFFECTS>(whole, state, columns);
     let airframe = &whole.airframe;
     let rotors = rotors(airframe, &state.rotor_speed);
 
@@ -139,38 +178,58 @@ fn derivative<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>
     }
     let wing_force = rest.force;
     rest.force = minus(&rest.force, &drag(&airframe.linear_drag, airframe.quadratic_drag, &air));
-    let rotor_rate = rotor_rates(airframe, &whole.held, &state.rotor_speed);
-    let sum = if EFFECTS {
-        let mut rotor_spin = [none; 2];
-        if Prepared::<L>::feel_rotor_spin(whole.present) {
-            rotor_spin = [spin(&whole.spin, &state.rotor_speed), spin(&whole.spin, &rotor_rate)];
-        }
-        let at = Surroundings {
-            flow: &air,
-            omega: &state.omega,
-            ned_from_body: &columns,
-            height_m: none - state.position[2],
-            inverse_mass: airframe.inverse_mass,
-            rotor_spin,
-            rotor_speed: &state.rotor_speed,
-            wing_force,
-            wings: &whole.plate,
-            deployment: whole.deployment,
-            tether_force: if whole.present.has_load() {
-                Some(whole.swing.force(&whole.load))
-            } else {
-                None
-            },
-        };
-        if L::FITS_A_REGISTER {
-            with_effects(&whole.effects, whole.present, [&rotors, &rest], &at)
+    if !EFFECTS {
+        return (rotors.plus(&rest), sides_rate);
+    }
+    let mut rotor_spin = [none; 2];
+    if Prepared::<L>::feel_rotor_spin(whole.present) {
+        rotor_spin = [spin(&whole.spin, &state.rotor_speed), spin(&whole.spin, rotor_rate)];
+    }
+    let at = Surroundings {
+        flow: &air,
+        omega: &state.omega,
+        ned_from_body: columns,
+        height_m: none - state.position[2],
+        inverse_mass: airframe.inverse_mass,
+        rotor_spin,
+        rotor_speed: &state.rotor_speed,
+        wing_force,
+        wings: &whole.plate,
+        deployment: whole.deployment,
+        tether_force: if whole.present.has_load() {
+            Some(whole.swing.force(&whole.load))
         } else {
-            effects_apart(&whole.effects, whole.present, [&rotors, &rest], &at)
-        }
-    } else {
-        rotors.plus(&rest)
+            None
+        },
     };
-    (body_rate(airframe, state, &columns, &sum, rotor_rate), sides_rate)
+    let sum = if L::FITS_A_REGISTER {
+        with_effects(&whole.effects, whole.present, [&rotors, &rest], &at)
+    } else {
+        effects_apart(&whole.effects, whole.present, [&rotors, &rest], &at)
+    };
+    (sum, sides_rate)
+}
+
+/// Force and moment without gravity; what an accelerometer reads without scale and bias, m/s^2, and
+/// the angular acceleration, rad/s^2. Body frame, with all effects.
+///
+/// * `accelerometer_m` - its place from the centre of mass
+#[inline(always)]
+pub fn felt<L: Lane, const ROTORS: usize, const WING: u8>(
+    whole: &Whole<L, ROTORS>,
+    state: &Motion<L, ROTORS>,
+    sides: &[Side<L>; 2],
+    accelerometer_m: &[L; 3],
+) -> (BodyWrench<L>, [[L; 3]; 2]) {
+    let columns = rotation(&state.attitude);
+    let airframe = &whole.airframe;
+    let rotor_rate = rotor_rates(airframe, &whole.held, &state.rotor_speed);
+    let (sum, _) = wrench::<L, ROTORS, WING, true>(whole, state, sides, &columns, &rotor_rate);
+    let inertia = [&airframe.inertia, &airframe.inertia_inverse];
+    let turning = body::angular_acceleration(inertia, &state.omega, &sum.moment);
+    let centre = vector::scaled(&sum.force, airframe.inverse_mass);
+    let felt = body::specific_force(&centre, [&state.omega, &turning], accelerometer_m);
+    (sum, [felt, turning])
 }
 
 /// [`Membrane::evaluate`]: in place, or as a function of its own, see [`Lane::FITS_A_REGISTER`].

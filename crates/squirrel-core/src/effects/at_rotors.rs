@@ -51,8 +51,9 @@ numbers! {
         drag [3],
         /// Likewise, N m s^2/(m rad).
         flapping,
-        /// Over velocity squared, N s^2/m^2.
-        lift,
+        /// Over velocity squared, N s^2/m^2; zero for what is no rotor, as its hub: lanes may have
+        /// more places than a vehicle has rotors.
+        lift [MAX_ROTORS],
         /// Hubs, from the centre of mass, m; zero for what is no rotor.
         hub_m [MAX_ROTORS] [3]
     }
@@ -67,13 +68,15 @@ impl<T: Real> Numbers<T> {
         // 1 over the sum of the rotors' speeds in hover.
         let per_hover = sqrt(thrust / vehicle.weight_n()) / count;
         let mut hub_m = [[T::zero(); 3]; MAX_ROTORS];
-        for (hub, rotor) in hub_m.iter_mut().zip(rotors) {
+        let mut lift = [T::zero(); MAX_ROTORS];
+        for ((hub, lift), rotor) in hub_m.iter_mut().zip(&mut lift).zip(rotors) {
             *hub = rotor.position.vector.into();
+            *lift = slopes.lift / count;
         }
         Self {
             drag: slopes.drag.map(|slope| slope * per_hover),
             flapping: slopes.flapping * per_hover,
-            lift: slopes.lift / count,
+            lift,
             hub_m,
         }
     }
@@ -83,10 +86,10 @@ impl<L: Lane> Numbers<L> {
     #[inline(always)]
     pub(super) fn wrench(&self, at: &Situation<'_, L>) -> BodyWrench<L> {
         let (mut out, none) = (BodyWrench::zero(), L::of(0.0));
-        for (hub, &speed) in self.hub_m.iter().zip(at.rotor_speed) {
+        for ((hub, &lift), &speed) in self.hub_m.iter().zip(&self.lift).zip(at.rotor_speed) {
             let [u, v, w] = plus(&at.flow.velocity, &cross(&at.flow.omega, hub));
             let ([x, y, z], flapping) = (self.drag, self.flapping * speed);
-            let lift = self.lift * (u * u + v * v);
+            let lift = lift * (u * u + v * v);
             let force = [none - x * speed * u, none - y * speed * v, none - z * speed * w - lift];
             let [roll, pitch, yaw] = cross(hub, &force);
             let moment = [roll - v * flapping, pitch + u * flapping, yaw];

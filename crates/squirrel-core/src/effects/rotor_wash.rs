@@ -94,6 +94,8 @@ impl<T: Real> RotorWash<T> {
         }
         let (rotors, half) = (vehicle.rotors(), real::<T>(0.5));
         let radius_m = vehicle.parameters().propulsion.propeller_radius_m;
+        // Lanes may have more places than a vehicle has rotors.
+        out.x_m = [real(NOWHERE_M); MAX_ROTORS];
         let mut plane_m = T::zero();
         for (i, rotor) in rotors.iter().enumerate() {
             (out.x_m[i], out.y_m[i]) = (rotor.position.vector.x, rotor.position.vector.y);
@@ -127,6 +129,8 @@ fn shared<L: Lane>([from, to]: [L; 2], middle: L, half: L) -> [L; 2] {
     [(high - low).upper(L::of(0.0)), L::of(0.5) * (low + high)]
 }
 
+/// Where no wing is, m.
+const NOWHERE_M: f64 = 1e6;
 /// Rotors whose jets are computed side by side.
 const BESIDE: usize = 4;
 

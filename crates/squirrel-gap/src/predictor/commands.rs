@@ -111,16 +111,15 @@ impl Clock<'_> {
             self.wing += 1;
         }
     }
-    /// Time of the next change, s; infinite after the last.
-    pub(crate) fn next_change_s(&self) -> f64 {
-        let rotor = self
-            .commands
-            .rotor
-            .get(self.rotor + 1)
-            .map_or(f64::INFINITY, |(s, _)| self.turns_s(*s));
-        let wing =
-            self.commands.wing.get(self.wing + 1).map_or(f64::INFINITY, |(s, _)| self.acts_s(*s));
-        rotor.min(wing)
+    /// Time of the next rotor command, s; infinite after the last.
+    pub(super) fn next_rotor_s(&self) -> f64 {
+        let next = self.commands.rotor.get(self.rotor + 1);
+        next.map_or(f64::INFINITY, |(stamp, _)| self.turns_s(*stamp))
+    }
+    /// Likewise of the next wing command.
+    pub(super) fn next_wing_s(&self) -> f64 {
+        let next = self.commands.wing.get(self.wing + 1);
+        next.map_or(f64::INFINITY, |(stamp, _)| self.acts_s(*stamp))
     }
     /// Rotor command in the vehicle's unit, and wing command, left and right, 0 to 1.
     pub(crate) fn now(&self) -> (PerRotor<f64>, [f64; 2]) {

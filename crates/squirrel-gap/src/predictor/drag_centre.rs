@@ -11,9 +11,7 @@ use super::{Hypothesis, Predictor};
 use crate::GapError;
 use nalgebra::Vector3;
 use squirrel_core::effects::{ConstantWind, Effect, Effects, LinearDrag, QuadraticDrag};
-use squirrel_core::frames::In;
-use squirrel_core::vehicle::MAX_ROTORS;
-use squirrel_sim::plant::{Plant, PlantState, WingPlant};
+use squirrel_sim::plant::{Plant, SideBySide, WingPlant};
 
 /// Drag that acts elsewhere.
 pub(super) struct DragCentre {
@@ -50,13 +48,12 @@ impl DragCentre {
         Ok(Some(Self { at_m, drag }))
     }
 
-    /// What it adds to the angular acceleration at the motion that a state has met, rad/s^2.
+    /// What it adds to the angular acceleration at each state, rad/s^2.
     ///
     /// * `plant` - whose inertia the vehicle has
-    pub(super) fn turns(&self, plant: &Plant, state: &PlantState) -> Vector3<f64> {
-        let mut still = *state;
-        still.body.rotor_speed_rad_s = [0.0; MAX_ROTORS];
-        let force = self.drag.wrench(&still, In::zero()).force.vector;
-        plant.vehicle().inertia_inverse() * self.at_m.cross(&force)
+    pub(super) fn turns(&self, plant: &Plant, states: &SideBySide) -> Vec<Vector3<f64>> {
+        let led = self.drag.led_at_without_rotors(states);
+        let inverse = plant.vehicle().inertia_inverse();
+        led.iter().map(|led| inverse * self.at_m.cross(&led.wrench.force.vector)).collect()
     }
 }

@@ -9,7 +9,7 @@
 //! not there fits it. A reading foretold from what was before it cannot be fitted so: its noise is
 //! new (the direct method of identification in closed loop: Ljung, System Identification, 13.4).
 
-use super::{DragCentre, Hypothesis, LED_STEP_S, Predictor, predicted};
+use super::{DragCentre, Hypothesis, LED_STEP_S, Predictor};
 use crate::GapError;
 use std::f64::consts::TAU;
 
@@ -50,9 +50,9 @@ impl Predictor<'_> {
         let paths = self.paths.of(&plant, &self.tracks, &self.commands, |_| 1);
         for (piece, track) in self.tracks.iter().enumerate() {
             let plant = self.plant_in(hypothesis, track.flight, LED_STEP_S)?;
-            let (motion, path) = (self.motion(piece, hypothesis), &paths[piece]);
-            let model = predicted(&plant, drag.as_ref(), track, &motion, path);
-            let gyro = &track.omega()[path.first..];
+            let motion = self.motion(piece, hypothesis);
+            let model = self.predicted(&plant, drag.as_ref(), piece, &motion, &paths);
+            let gyro = &track.omega()[paths.piece(piece, track).first..];
             let dt_s = track.period_s;
             for (squares, bandwidth_hz) in squares.iter_mut().zip(BANDWIDTHS_HZ) {
                 let gain = 1.0 - (-TAU * bandwidth_hz * dt_s).exp();

@@ -4,8 +4,8 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 /// The last `N` answers by what they depend on, the newest first: by default that of the hypothesis
-/// that others are compared with, and the last.
-pub(crate) struct Kept<K, V, const N: usize = 2>(RefCell<Vec<(K, Rc<V>)>>);
+/// that others are compared with, and the last three.
+pub(crate) struct Kept<K, V, const N: usize = 4>(RefCell<Vec<(K, Rc<V>)>>);
 
 impl<K, V, const N: usize> Default for Kept<K, V, N> {
     fn default() -> Self {
@@ -33,7 +33,7 @@ mod tests {
 
     #[test]
     fn what_was_asked_last_is_not_asked_again() {
-        let kept = Kept::<i32, i32>::default();
+        let kept = Kept::<i32, i32, 2>::default();
         let asked = RefCell::new(0);
         let square = |x: i32| {
             *kept.get(x, || {

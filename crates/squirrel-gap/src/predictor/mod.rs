@@ -20,6 +20,7 @@ mod drag_centre;
 mod hypothesis;
 mod innovations;
 mod kept;
+mod led;
 mod noise;
 mod slope;
 mod spread;
@@ -35,15 +36,16 @@ pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 use crate::GapError;
 use crate::flight::inertial::Common;
 use crate::flight::recording::Recording;
-use actuators::{Path, Paths, stride};
+use actuators::{KeptPaths, stride};
 use drag_centre::DragCentre;
 use hypothesis::Asked;
 use kept::Kept;
+use led::Same;
 use nalgebra::{Vector3, Vector6};
 use squirrel_core::effects::Effects;
 use squirrel_core::vehicle::PerRotor;
 use squirrel_log::FlightLog;
-use squirrel_sim::plant::{Plant, PlantState, WingPlant};
+use squirrel_sim::plant::{Plant, PlantState, SideBySide, WingPlant};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::ops::Range;
 use std::rc::Rc;
@@ -99,7 +101,9 @@ pub(crate) struct Predictor<'a> {
     plain: Vec<Rc<Motion>>,
     /// Of each track, the last motions under other errors.
     motions: Vec<Kept<(SensorPath, SensorErrors), Motion>>,
-    paths: Paths,
+    paths: KeptPaths,
+    /// Of each track, the last states that a plant was led to.
+    states: Vec<Kept<Same, SideBySide>>,
     /// Of each track, the last residuals of its dynamics.
     dynamics: Vec<Kept<Asked, Vec<Vector6<f64>>, ANSWERS>>,
 }
@@ -200,8 +204,9 @@ impl<'a> Predictor<'a> {
             }
         }
         let motions = tracks.iter().map(|_| Kept::default()).collect();
+        let states = tracks.iter().map(|_| Kept::default()).collect();
         let dynamics = tracks.iter().map(|_| Kept::default()).collect();
-        let paths = Paths::default();
+        let paths = KeptPaths::default();
         let rotor_speeds = common.rotor_speeds;
         Ok(Self {
             vehicle,
@@ -214,6 +219,7 @@ impl<'a> Predictor<'a> {
             plain,
             motions,
             paths,
+            states,
             dynamics,
         })
     }
@@ -332,8 +338,8 @@ impl<'a> Predictor<'a> {
             let motion = self.motion(piece, hypothesis);
             let own = days[track.flight].as_ref().unwrap_or(&plant);
             let dynamics = self.dynamics[piece].get(hypothesis.asked_of(track.flight), || {
-                let model = predicted(own, drag.as_ref(), track, &motion, &paths[piece]);
-                dynamics(track, &paths[piece], &model)
+                let model = self.predicted(own, drag.as_ref(), piece, &motion, &paths);
+                led::dynamics(track, paths.piece(piece, track), &model)
             });
             while let Some(segment) = segments.next_if(|s| s.piece == piece) {
                 let out = &mut rows[segment.rows.clone()];
@@ -493,7 +499,7 @@ impl<'a> Predictor<'a> {
         let track = &self.tracks[piece];
         let paths = self.paths.of(plant, &self.tracks, &self.commands, |_| 1);
         let mut out = Vec::with_capacity(samples.len());
-        lead(plant, track, motion, &paths[piece], |k, state| {
+        led::lead(plant, track, motion, paths.piece(piece, track), |k, state| {
             if samples.get(out.len()) == Some(&k) {
                 out.push(*state);
             }
@@ -520,72 +526,3 @@ fn sensors(effects: &Effects<f64>) -> SensorPath {
 const LOOKED_AT_S: f64 = 480.0;
 /// The step of a plant that is only led matters to nothing; it is shorter than any lag.
 const LED_STEP_S: f64 = 1e-9;
-/// How long the first sample of a piece is held before it, so that rotors and servos start settled,
-/// s.
-const SETTLE_S: f64 = 1.0;
-
-/// Leads the plant along a piece and shows its state at each moment of the path, with the sample of
-/// the grid.
-fn lead(
-    plant: &Plant,
-    track: &Track,
-    motion: &Motion,
-    path: &Path,
-    mut each: impl FnMut(usize, &PlantState),
-) {
-    let Path { stride, first, moments, .. } = path;
-    let mut state = plant.initial_state(motion.body[*first], 1.0);
-    plant.meet(&mut state, &motion.body[*first], &moments[0].now);
-    let settled = moments[0].now.deployment();
-    plant.pass(&mut state, Some([settled; 2]), SETTLE_S);
-    state.time_s = track.time_s[*first] - track.began_s;
-    let dt_s = *stride as f64 * track.period_s;
-    for (i, moment) in moments.iter().enumerate() {
-        let k = first + i * stride;
-        let now = moment.now.deployment();
-        plant.meet(&mut state, &motion.body[k], &moment.now);
-        state.battery.voltage_v = track.voltage_v[k];
-        each(k, &state);
-        let after = moments.get(i + 1).map_or(now, |next| next.now.deployment());
-        plant.pass(&mut state, (!moment.idle).then_some([now, after]), dt_s);
-    }
-}
-
-/// Residual of the dynamics of a piece.
-///
-/// * `predicted` - at each moment of the path
-fn dynamics(track: &Track, path: &Path, predicted: &[Vector6<f64>]) -> Vec<Vector6<f64>> {
-    let filter = if path.stride == 1 { &track.filter } else { &track.model_filter };
-    let filtered = filter.apply(predicted, track.edge() - path.first, track.every);
-    track.measured.iter().zip(filtered).map(|(measured, model)| measured - model).collect()
-}
-
-/// Specific force and angular acceleration, as the sensors would have them, at each moment of the
-/// path.
-fn predicted(
-    plant: &Plant,
-    drag: Option<&DragCentre>,
-    track: &Track,
-    motion: &Motion,
-    path: &Path,
-) -> Vec<Vector6<f64>> {
-    let mut jumps = path.before.iter().filter(|_| actuators::jumps(plant.effects())).peekable();
-    let mut predicted = Vec::with_capacity(path.moments.len());
-    let [rate_scale, _] = track.scales(plant.effects());
-    lead(plant, track, motion, path, |k, state| {
-        let led = plant.led(state);
-        let mut a = led.angular_acceleration;
-        // A rotor's acceleration jumps with its command: what a sample stands for lies half before
-        // and half after the jump.
-        if let Some((_, before)) = jumps.next_if(|(moment, _)| *moment == predicted.len()) {
-            let mut earlier = *state;
-            plant.meet(&mut earlier, &motion.body[k], before);
-            a = (a + plant.led(&earlier).angular_acceleration) * 0.5;
-        }
-        let f = track.as_shown(k, led.specific_force.vector, motion, plant.effects());
-        let turned = drag.map_or_else(Vector3::zeros, |drag| drag.turns(plant, state));
-        let a = (a.vector + turned).component_mul(&rate_scale);
-        predicted.push(Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z));
-    });
-    predicted
-}

@@ -7,13 +7,9 @@
 //! followed.
 
 use super::{Plant, PlantState, WingPlant};
-use squirrel_core::aero::flat_plate;
-use squirrel_core::aero::membrane::{Membrane, Side};
-use squirrel_core::dynamics::lanes::{Airframe, Held, Motion};
-use squirrel_core::dynamics::rotors::spin_signs;
+use squirrel_core::dynamics::lanes::Motion;
 use squirrel_core::dynamics::runge_kutta;
-use squirrel_core::dynamics::whole::{self, FLAT, MEMBRANE, Whole, lateral};
-use squirrel_core::effects::{PendulumState, Swing};
+use squirrel_core::dynamics::whole::{self, FLAT, MEMBRANE, lateral};
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::lane::vector::rotation;
 use squirrel_core::lane::{Dual, Lane};
@@ -59,43 +55,17 @@ impl Plant {
         wind: In<Ned, f64>,
     ) -> Option<Jacobian> {
         let constant = Variable::constant;
-        let vehicle = self.vehicle();
-        let first = |all: &PerRotor<f64>| core::array::from_fn(|i| constant(all[i]));
-        let own = vehicle.parameters().wing;
-        let (plate, membrane) = match &self.wing {
-            WingPlant::None => (own, None),
-            WingPlant::Flat { wing, .. } => (Some(*wing), None),
-            WingPlant::Membrane { membrane, .. } => (own, Some(membrane.parameters().numbers())),
-            WingPlant::Parnn { .. } => return None,
-        };
-        let plate = plate.as_ref().map_or(flat_plate::Pair::all(0.0), flat_plate::Pair::new);
-        let extra_s = self.acting().rotor_extra_time_constant_s();
-        let mut vehicle = Whole::<Variable, ROTORS> {
-            airframe: Airframe::new(vehicle, extra_s).map(constant),
-            held: Held {
-                wind: <[f64; 3]>::from(wind.vector).map(constant),
-                target_speed: first(&state.drive.target_rad_s),
-            },
-            air_omega: state.air_omega.map(|air| <[f64; 3]>::from(air.vector).map(constant)),
-            plate: plate.map(constant),
-            membrane: membrane.unwrap_or(Membrane::all(0.0)).map(constant),
-            present: self.acting().present(),
-            effects: self.acting().numbers().map(constant),
-            spin: first(&spin_signs(vehicle)),
-            swing: self.swing.unwrap_or(Swing::all(0.0)).map(constant),
-            load: PendulumState::map(&state.load, constant),
-            deployment: deployment.map(constant),
-            angle_rate: [constant(0.0); 2],
-        };
+        let membrane = matches!(self.wing, WingPlant::Membrane { .. });
+        let mut vehicle = self.whole::<ROTORS>()?;
+        vehicle.held.wind = wind.vector.into();
+        vehicle.held.target_speed = core::array::from_fn(|i| state.drive.target_rad_s[i]);
+        vehicle.air_omega = state.air_omega.map(|air| air.vector.into());
+        vehicle.load = state.load;
+        vehicle.deployment = deployment;
+        let mut vehicle = vehicle.map(constant);
         let before = variables::<ROTORS>(&Motion::from(&state.body));
-        let m = &state.membrane;
-        let side = |side: usize| Side {
-            fast_camber: constant(m.fast_camber[side]),
-            creep_camber: constant(m.creep_camber[side]),
-            attached: constant(m.attached[side]),
-        };
-        let sides = [side(0), side(1)];
-        if membrane.is_some() {
+        let sides = [0, 1].map(|side| state.membrane.side(side).map(constant));
+        if membrane {
             let air = whole::air::<_, ROTORS, true>(&vehicle, &before, &rotation(&before.attitude));
             let y = lateral(vehicle.membrane.arm_m);
             for side in 0..2 {
@@ -105,8 +75,7 @@ impl Plant {
             }
         }
         let stages = runge_kutta(constant(self.dt_s()));
-        // No wing is one that never opens: a step of its own would only be compiled once more.
-        let (after, _) = if membrane.is_some() {
+        let (after, _) = if membrane {
             whole::step::<_, ROTORS, MEMBRANE, true>(&vehicle, &stages, &before, &sides)
         } else {
             whole::step::<_, ROTORS, FLAT, true>(&vehicle, &stages, &before, &sides)

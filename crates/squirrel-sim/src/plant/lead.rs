@@ -12,7 +12,9 @@
 
 use super::{Membrane, Plant, PlantState, ServoState, WingPlant};
 use squirrel_core::aero::Air;
+use squirrel_core::dynamics::servo::Servo;
 use squirrel_core::dynamics::{self, RotorDrive, State, rk4};
+use squirrel_core::effects::Swing;
 use squirrel_core::frames::{Body, In, Wrench};
 use squirrel_core::rnn::parnn::{STEP_S, WINDOW};
 use squirrel_core::vehicle::PerRotor;
@@ -28,20 +30,35 @@ pub struct Led {
     pub angular_acceleration: In<Body, f64>,
 }
 
-/// Rotors and wing servos at one moment of a led flight: what depends on commands, voltage and
-/// their lags alone, so that plants which share those can be led along the same ones.
+/// The rotors at one moment of a led flight: what depends on commands, voltage and their lags
+/// alone, so that plants which share those can be led along the same ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Actuators {
-    rotor_speed_rad_s: PerRotor<f64>,
+pub struct Rotors {
+    speed_rad_s: PerRotor<f64>,
     drive: RotorDrive<f64>,
-    servo: [ServoState; 2],
 }
 
-impl Actuators {
-    /// Deployment of the left and the right wing, 0..1.
-    #[inline]
-    pub fn deployment(&self) -> [f64; 2] {
-        self.servo.map(|servo| servo.deployment)
+impl PlantState {
+    /// The rotors as they are at another moment.
+    pub fn take_rotors(&mut self, rotors: &Rotors) {
+        self.body.rotor_speed_rad_s = rotors.speed_rad_s;
+        self.drive = rotors.drive;
+    }
+}
+
+/// Moves wing servos under a command.
+///
+/// * `servo` - over `dt_s`
+/// * `wing_command` - left, right, 0..1
+pub fn lead_servos(
+    servo: &Servo<f64>,
+    servos: &mut [ServoState; 2],
+    wing_command: [f64; 2],
+    dt_s: f64,
+) {
+    for (state, command) in servos.iter_mut().zip(wing_command) {
+        state.ask(command.clamp(0.0, 1.0), servo.dead_time_s);
+        servo.lead_one(state, dt_s);
     }
 }
 
@@ -65,15 +82,19 @@ impl Plant {
         battery_voltage_v: f64,
         dt_s: f64,
     ) -> Led {
-        let now = self.tell(state, rotor_command, battery_voltage_v);
-        self.meet(state, motion, &now);
-        let led = self.led(state);
-        self.lead_actuators(state, wing_command, dt_s);
-        self.pass(state, Some([now.deployment(), state.deployment()]), dt_s);
+        let rotors = self.tell(state, rotor_command, battery_voltage_v);
+        let swing = self.load.map(|load| load.over(state.led_s));
+        self.meet(state, motion, &rotors, swing.as_ref());
+        let (led, before) = (self.led(state), state.deployment());
+        self.lead_rotors(state, dt_s);
+        if let Some(servo) = self.servos_over(dt_s).filter(|_| dt_s > 0.0) {
+            lead_servos(&servo, &mut state.servo, wing_command, dt_s);
+        }
+        self.pass(state, Some([before, state.deployment()]), dt_s);
         led
     }
 
-    /// Tells the rotors of a state a command; the actuators as they are then.
+    /// Tells the rotors of a state a command; the rotors as they are then.
     ///
     /// * arguments as in [`Self::lead`]
     pub fn tell(
@@ -81,71 +102,76 @@ impl Plant {
         state: &mut PlantState,
         rotor_command: &PerRotor<f64>,
         battery_voltage_v: f64,
-    ) -> Actuators {
+    ) -> Rotors {
         state.battery.voltage_v = battery_voltage_v;
         self.drive(state, rotor_command);
-        let PlantState { body, drive, servo, .. } = *state;
-        Actuators { rotor_speed_rad_s: body.rotor_speed_rad_s, drive, servo }
+        Rotors { speed_rad_s: state.body.rotor_speed_rad_s, drive: state.drive }
     }
 
-    /// Moves rotors and wing servos alone, under the command that they were told.
+    /// Moves the rotors alone, under the command that they were told.
     ///
-    /// * arguments as in [`Self::lead`]
-    pub fn lead_actuators(&self, state: &mut PlantState, wing_command: [f64; 2], dt_s: f64) {
+    /// * `dt_s` - of any length; nothing moves if it is not above 0
+    pub fn lead_rotors(&self, state: &mut PlantState, dt_s: f64) {
         if dt_s > 0.0 {
             let drive = state.drive;
             drive.lead(&mut state.body.rotor_speed_rad_s, dt_s);
-            let (WingPlant::Flat { servo, .. }
-            | WingPlant::Membrane { servo, .. }
-            | WingPlant::Parnn { servo, .. }) = &self.wing
-            else {
-                return;
-            };
-            // Mostly both are, and an exponential is dear.
-            let wing_command = wing_command.map(|command| command.clamp(0.0, 1.0));
-            if state.servo.iter().zip(wing_command).all(|(state, command)| state.rests(command)) {
-                return;
-            }
-            let servo = servo.over(self.effects.wing_extra_time_constant_s(), dt_s);
-            for (state, command) in state.servo.iter_mut().zip(wing_command) {
-                state.ask(command, servo.dead_time_s);
-                servo.lead(state, dt_s);
-            }
         }
     }
 
-    /// Puts a state into a measured motion with actuators as they are there; a slung load has swung
+    /// The wing servos over a time, s; `None` without wings.
+    pub fn servos_over(&self, dt_s: f64) -> Option<Servo<f64>> {
+        let servo = self.wing.servo()?;
+        Some(servo.over(self.effects.wing_extra_time_constant_s(), dt_s))
+    }
+
+    /// Puts a state into a measured motion with the rotors as they are there; a slung load has swung
     /// until then.
-    pub fn meet(&self, state: &mut PlantState, motion: &State<f64>, actuators: &Actuators) {
-        if let Some(load) = &self.load
-            && state.led_s > 0.0
-        {
+    ///
+    /// * `swing` - over the time since the last motion, where there is a load
+    pub fn meet(
+        &self,
+        state: &mut PlantState,
+        motion: &State<f64>,
+        rotors: &Rotors,
+        swing: Option<&Swing<f64>>,
+    ) {
+        if let Some(swing) = swing.filter(|_| state.led_s > 0.0) {
             let acceleration = (motion.velocity - state.body.velocity) * (1.0 / state.led_s);
-            load.over(state.led_s).lead(&mut state.load, acceleration.vector.xy().into());
+            swing.lead(&mut state.load, acceleration.vector.xy().into());
         }
-        state.body = State { rotor_speed_rad_s: actuators.rotor_speed_rad_s, ..*motion };
-        (state.drive, state.servo) = (actuators.drive, actuators.servo);
+        state.body = *motion;
+        state.take_rotors(rotors);
     }
 
     /// What the plant says at the motion that a state has met.
     pub fn led(&self, state: &PlantState) -> Led {
         let wrench = self.wrench(state, In::zero());
-        let mut specific_force =
+        let specific_force =
             dynamics::specific_force(&self.vehicle, &self.effects, state.body.omega, &wrench);
-        if self.effects.any() {
-            let scale = self.effects.accel_scale().vector.add_scalar(1.0);
-            specific_force = In::new(specific_force.vector.component_mul(&scale))
-                + self.effects.specific_force_bias(state.time_s);
-        }
         Led {
             wrench,
-            specific_force,
+            specific_force: self.read(specific_force, state.time_s),
             angular_acceleration: dynamics::angular_acceleration(
                 &self.vehicle,
                 state.body.omega,
                 &wrench,
             ),
         }
+    }
+
+    /// What the accelerometer makes of a specific force.
+    pub(super) fn read(&self, specific_force: In<Body, f64>, time_s: f64) -> In<Body, f64> {
+        if !self.effects.any() {
+            return specific_force;
+        }
+        let scale = self.effects.accel_scale().vector.add_scalar(1.0);
+        In::new(specific_force.vector.component_mul(&scale))
+            + self.effects.specific_force_bias(time_s)
+    }
+
+    /// Wind of the effects, north and east, m/s.
+    pub fn wind_m_s(&self, height_m: f64) -> [f64; 2] {
+        self.acting.numbers().wind(self.acting.present(), height_m)
     }
 
     /// Time after which nothing is left of what the wings went through, s.

@@ -47,6 +47,14 @@ impl MembraneState {
     pub fn at_rest() -> Self {
         Side::at_rest().into()
     }
+    /// One side, 0 the left and 1 the right.
+    pub(super) fn side(&self, side: usize) -> Side<f64> {
+        Side {
+            fast_camber: self.fast_camber[side],
+            creep_camber: self.creep_camber[side],
+            attached: self.attached[side],
+        }
+    }
     #[inline(always)]
     fn sides(&self) -> Side<Pair> {
         Side {

@@ -10,14 +10,16 @@ mod lead;
 mod membrane;
 mod parnn_wing;
 mod servo;
+mod side_by_side;
 mod wind;
 
 pub use battery::{BatteryParameters, BatteryState};
 pub use jacobian::{Jacobian, VARIABLES};
-pub use lead::{Actuators, Led};
+pub use lead::{Led, Rotors, lead_servos};
 pub use membrane::{Membrane, MembraneParameters, MembraneState};
 pub use parnn_wing::{ParnnWing, ParnnWingState};
 pub use servo::{ServoParameters, ServoState};
+pub use side_by_side::SideBySide;
 pub use wind::{GustModel, Meeting, Wind, WindParameters};
 
 use squirrel_core::aero::Air;
@@ -395,7 +397,7 @@ impl Plant {
         for side in 0..2 {
             let state = &mut state.servo[side];
             state.ask(command[side].clamp(0.0, 1.0), servo.dead_time_s);
-            mean[side] = servo.lead(state, self.dt_s);
+            mean[side] = servo.lead_one(state, self.dt_s);
         }
         mean
     }

@@ -1,17 +1,19 @@
 //! Effects in vehicle files and in flights: every effect and form can be written, and what sensors,
 //! clocks and servos do shows in the log.
 
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 use squirrel_core::dynamics::State;
 use squirrel_core::effects::{Effects, FORM, Kind, forms};
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::{Quaternion, Vector3};
-use squirrel_core::vehicle::MAX_ROTORS;
+use squirrel_core::vehicle::{MAX_ROTORS, Vehicle};
 use squirrel_log::FlightLog;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Flight, Integrator, Setup};
-use squirrel_sim::plant::Plant;
+use squirrel_sim::plant::{Led, Plant, PlantState, WingPlant};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::sensors::SensorParameters;
 use squirrel_sim::vehicle_file::{SQUIRREL_TOML, VehicleFile, effects_page, listed_effects};
@@ -385,4 +387,68 @@ fn a_led_plant_reads_the_accelerometer_of_the_log() {
     // What is left is the rounding of the log's sensors to single precision, and the load between
     // samples.
     assert!(worst < 1e-4, "{worst} m/s^2");
+}
+
+/// Plants are asked at many states at once, on registers: each effect and form, without wings, with
+/// flat ones and with membranes, with four rotors and with six in eight places, says the same there
+/// as at one state after the other.
+#[test]
+fn many_states_at_once_say_what_each_says() {
+    let mut rng = Pcg64Mcg::seed_from_u64(5);
+    let mut draw = |size: f64| rng.random_range(-size..size);
+    let mut bodies = Vec::new();
+    for _ in 0..20 {
+        let mut body = State::at_rest();
+        let mut three = |size| Vector3::from_fn(|_, _| draw(size));
+        (body.position, body.velocity) = (In::new(three(2.0)), In::new(three(8.0)));
+        body.omega = In::new(three(4.0));
+        body.attitude *= Quaternion::new(1.0, draw(0.5), draw(0.5), draw(2.0));
+        bodies.push(body.normalised());
+    }
+    let of_rotors = |count: usize| {
+        let mut parameters = *parse("").unwrap().vehicle.parameters();
+        parameters.rotor_count = count;
+        for i in 4..count {
+            parameters.rotors[i] = parameters.rotors[i - 4];
+            parameters.rotors[i].position.vector.x *= 1.5;
+        }
+        Vehicle::new(parameters).unwrap()
+    };
+    let flat = SQUIRREL_TOML.replace("model = \"membrane\"", "model = \"flat\"");
+    let flat = VehicleFile::parse(&flat, "file").unwrap().wing;
+    let all = Effects::<f64>::NAMES.iter().flat_map(|name| {
+        let names = forms(Effects::<f64>::parameters(name).unwrap());
+        names.iter().copied().chain(names.is_empty().then_some("")).map(|form| table(name, form))
+    });
+    for effect in all.chain([String::new()]) {
+        let file = parse(&effect).unwrap();
+        for (rotors, wing) in [
+            (4, WingPlant::None),
+            (4, flat.clone()),
+            (4, file.wing.clone()),
+            (6, flat.clone()),
+            (6, file.wing.clone()),
+        ] {
+            let plant = Plant::new(of_rotors(rotors), file.effects, wing, None, 1e-3).unwrap();
+            let mut states = plant.side_by_side(bodies.len());
+            let (mut met, mut expected) = (Vec::new(), Vec::new());
+            let mut state = plant.initial_state(bodies[0], 1.0);
+            for (i, body) in bodies.iter().enumerate() {
+                let speed = [0, 1, 2, 3, 4, 5, 6, 7].map(|r| 0.4 + 0.01 * f64::from(r + i as u8));
+                plant.lead(&mut state, body, &speed, [0.9, 0.7], 15.0, 0.02);
+                states.push(&state);
+                met.push(state);
+                expected.push(plant.led(&state));
+            }
+            let case = format!("{rotors} rotors, {effect}");
+            assert_eq!(plant.led_at(&states), expected, "{case}");
+            let still = |state: &PlantState| {
+                let mut state = *state;
+                state.body.rotor_speed_rad_s = [0.0; MAX_ROTORS];
+                plant.led(&state)
+            };
+            let expected: Vec<Led> = met.iter().map(still).collect();
+            assert_eq!(plant.led_at_without_rotors(&states), expected, "still, {case}");
+        }
+    }
 }
