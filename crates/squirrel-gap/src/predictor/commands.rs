@@ -34,9 +34,12 @@ impl Commands {
             (t - ahead_s, all)
         });
         let wing = recording.wing.iter().flat_map(Series::samples).map(|(t, c)| (t, [c[0], c[1]]));
+        let mut wing: Vec<_> = wing.collect();
+        // A log may hold a stream, or its edges alone.
+        wing.dedup_by(|next, last| next.1 == last.1);
         Self {
             rotor: rotor.collect(),
-            wing: wing.collect(),
+            wing,
             began_s: recording.pieces[0].0,
             rotor_speeds: speed.is_some(),
             period_s,
