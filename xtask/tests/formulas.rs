@@ -118,7 +118,7 @@ const DENSITY: [&str; 11] = [
 ];
 
 /// What a file calls, without spaces, instead of writing it again.
-const CALLS: [(&str, &[&str]); 8] = [
+const CALLS: [(&str, &[&str]); 9] = [
     (
         "batch/src/dynamics.rs",
         &["derivative(&airframe", "whole::step::<", "whole::air::<", "servo.lead(", "packs.step("],
@@ -137,8 +137,9 @@ const CALLS: [(&str, &[&str]); 8] = [
     ),
     (
         "sim/src/plant/mod.rs",
-        &["dynamics::derivative(", "membrane.evaluate(", "servo.lead(", "battery.step("],
+        &["dynamics::derivative(", "membrane.evaluate(", "servo.lead_one(", "battery.step("],
     ),
+    ("sim/src/plant/side_by_side.rs", &["whole::felt::<"]),
     (
         "core/src/dynamics/mod.rs",
         &["aero::drag(", "rotors::wrench(", "body::acceleration(", "with_effects("],

@@ -1,4 +1,5 @@
-//! One plant step, one call of the led plant, and one vehicle in complete closed loop.
+//! One plant step, one call of the led plant, what it says at many states, and one vehicle in
+//! complete closed loop.
 //!
 //! `plant_step_without_wing` counts RK4 steps of rigid body, four rotor lags, drag and battery;
 //! `closed_loop` counts seconds of flight (plant at 1 kHz with membrane wing, battery, gusts and
@@ -73,6 +74,37 @@ fn leading(c: &mut Criterion) {
     group.finish();
 }
 
+/// What plants with wings and four effects say at the same states: at one after the other, and at
+/// all at once.
+fn led(c: &mut Criterion) {
+    let mut file = VehicleFile::squirrel();
+    for (name, size) in [
+        ("linear_drag", 0.1),
+        ("cg_offset", 0.004),
+        ("ground_effect", 0.3),
+        ("quadratic_drag", 0.01),
+    ] {
+        let found = file.effects.insert(name).expect("known");
+        found.values[0] = size;
+    }
+    let mut group = c.benchmark_group("led");
+    let count = 1000;
+    group.throughput(Throughput::Elements(count));
+    for (name, wing) in [("without_wing", WingPlant::None), ("membrane_wing", file.wing.clone())] {
+        let plant = Plant::new(file.vehicle, file.effects, wing, None, 1e-3).expect("sound");
+        let states = vec![start(&plant); count as usize];
+        let mut all = plant.side_by_side(states.len());
+        states.iter().for_each(|state| all.push(state));
+        group.bench_function(format!("{name}_one_by_one"), |b| {
+            b.iter(|| black_box(&states).iter().map(|s| plant.led(s)).collect::<Vec<_>>());
+        });
+        group.bench_function(format!("{name}_at_once"), |b| {
+            b.iter(|| plant.led_at(black_box(&all)));
+        });
+    }
+    group.finish();
+}
+
 fn closed_loop(c: &mut Criterion) {
     let mut scenario = Scenario::find("track").expect("built in");
     scenario.duration_s = 10.0;
@@ -94,6 +126,6 @@ fn closed_loop(c: &mut Criterion) {
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(20).measurement_time(std::time::Duration::from_secs(3));
-    targets = plant_steps, leading, closed_loop
+    targets = plant_steps, leading, led, closed_loop
 }
 criterion_main!(benches);

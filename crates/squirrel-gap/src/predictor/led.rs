@@ -17,7 +17,7 @@ use std::rc::Rc;
 pub(super) const SETTLE_S: f64 = 1.0;
 
 /// Everything that the states of a piece depend on.
-pub(super) struct Same {
+pub(super) struct StatesKey {
     // Held, so that nothing else comes to lie where they lie.
     motion: Rc<Motion>,
     paths: Paths,
@@ -26,7 +26,7 @@ pub(super) struct Same {
     wind_m_s: [[f64; 2]; 3],
 }
 
-impl PartialEq for Same {
+impl PartialEq for StatesKey {
     fn eq(&self, other: &Self) -> bool {
         Rc::ptr_eq(&self.motion, &other.motion)
             && self.paths == other.paths
@@ -35,7 +35,7 @@ impl PartialEq for Same {
     }
 }
 
-impl Same {
+impl StatesKey {
     fn of(plant: &Plant, motion: &Rc<Motion>, paths: &Paths) -> Self {
         let wind = |height_m| {
             if plant.wing_memory_s() == 0.0 { [0.0; 2] } else { plant.wind_m_s(height_m) }
@@ -111,7 +111,7 @@ impl Predictor<'_> {
         let track = &self.tracks[piece];
         let path = paths.piece(piece, track);
         let states = self.states[piece]
-            .get(Same::of(plant, motion, paths), || states(plant, track, motion, path));
+            .get(StatesKey::of(plant, motion, paths), || states(plant, track, motion, path));
         let effects = plant.effects();
         let [rate_scale, _] = track.scales(effects);
         let turned = drag.map_or(Vec::new(), |drag| drag.turns(plant, &states));

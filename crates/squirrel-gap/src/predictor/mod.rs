@@ -40,7 +40,7 @@ use actuators::{KeptPaths, stride};
 use drag_centre::DragCentre;
 use hypothesis::Asked;
 use kept::Kept;
-use led::Same;
+use led::StatesKey;
 use nalgebra::{Vector3, Vector6};
 use squirrel_core::effects::Effects;
 use squirrel_core::vehicle::PerRotor;
@@ -103,7 +103,7 @@ pub(crate) struct Predictor<'a> {
     motions: Vec<Kept<(SensorPath, SensorErrors), Motion>>,
     paths: KeptPaths,
     /// Of each track, the last states that a plant was led to.
-    states: Vec<Kept<Same, SideBySide>>,
+    states: Vec<Kept<StatesKey, SideBySide>>,
     /// Of each track, the last residuals of its dynamics.
     dynamics: Vec<Kept<Asked, Vec<Vector6<f64>>, ANSWERS>>,
 }
