@@ -94,7 +94,9 @@ fn led(c: &mut Criterion) {
         let plant = Plant::new(file.vehicle, file.effects, wing, None, 1e-3).expect("sound");
         let states = vec![start(&plant); count as usize];
         let mut all = plant.side_by_side(states.len());
-        states.iter().for_each(|state| all.push(state));
+        for state in &states {
+            all.push(state);
+        }
         group.bench_function(format!("{name}_one_by_one"), |b| {
             b.iter(|| black_box(&states).iter().map(|s| plant.led(s)).collect::<Vec<_>>());
         });
