@@ -16,12 +16,13 @@ const LIST: &str = "docs/guide/effects.md";
 const LINES_MAX: usize = 4;
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// What is asked of the copy, by module or the beginning of a name. The last two ask for one effect by `SQUIRREL_EFFECT`.
-const TESTS: [&str; 3] = ["effects::", "seen_by_find::", "twins::"];
+const TESTS: [&str; 4] = ["effects::", "vehicle::every_effect", "seen_by_find::", "twins::"];
 
 /// Crates of the copy that are compiled with little optimisation or none: compiling them takes far
 /// longer than what the tests ask of them.
-const LEVELS: [(&str, u8); 5] = [
+const LEVELS: [(&str, u8); 6] = [
     ("hidden-effects", 1),
+    ("squirrel-batch", 0),
     ("squirrel-gap", 1),
     ("squirrel-log", 1),
     ("squirrel-report", 0),
@@ -85,7 +86,9 @@ fn tested(copy: &Path, name: &str) -> Result<(), String> {
         command.args(["--config", &format!("profile.release.package.{name}.opt-level={level}")]);
     }
     command.args(
-        ["squirrel-py", "squirrel-sim", "hidden-effects"].iter().flat_map(|name| ["-p", name]),
+        ["squirrel-py", "squirrel-sim", "squirrel-batch", "hidden-effects"]
+            .iter()
+            .flat_map(|name| ["-p", name]),
     );
     command.args(["--test", "it", "--"]).args(TESTS);
     let done =
