@@ -118,7 +118,7 @@ const DENSITY: [&str; 11] = [
 ];
 
 /// What a file calls, without spaces, instead of writing it again.
-const CALLS: [(&str, &[&str]); 9] = [
+const CALLS: [(&str, &[&str]); 10] = [
     (
         "batch/src/dynamics.rs",
         &["derivative(&airframe", "whole::step::<", "whole::air::<", "servo.lead(", "packs.step("],
@@ -137,8 +137,9 @@ const CALLS: [(&str, &[&str]); 9] = [
     ),
     (
         "sim/src/plant/mod.rs",
-        &["dynamics::derivative(", "membrane.evaluate(", "servo.lead_one(", "battery.step("],
+        &["dynamics::derivative(", "membrane.evaluate(", "lead_servos(", "battery.step("],
     ),
+    ("sim/src/plant/servo.rs", &["servo.lead_one("]),
     ("sim/src/plant/side_by_side.rs", &["whole::felt::<"]),
     (
         "core/src/dynamics/mod.rs",

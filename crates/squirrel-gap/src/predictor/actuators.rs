@@ -210,16 +210,12 @@ fn wings(plant: &Plant, track: &Track, commands: &Commands, stride: usize) -> Ve
     let step_s = stride as f64 * track.period_s;
     let moments = (track.time_s.len() - start).div_ceil(stride);
     let mut servo = [ServoState::at_rest(); 2];
-    let Some(over_step) = plant.servos_over(step_s) else {
+    let Some(over) = plant.servos() else {
         return vec![Wings { servo, idle: true }; moments];
     };
     let mut clock = commands.clock(plant.effects(), track.time_s[start]);
-    let lead = |servo: &mut [ServoState; 2], command, dt_s| {
-        if let Some(over) = plant.servos_over(dt_s) {
-            lead_servos(&over, servo, command, dt_s);
-        }
-    };
-    lead(&mut servo, clock.now().1, SETTLE_S);
+    lead_servos(&over(SETTLE_S), &mut servo, clock.now().1, SETTLE_S);
+    let over_step = over(step_s);
     let mut wings = Vec::with_capacity(moments);
     for (_, span_s) in spans(track, stride) {
         clock.advance_to(span_s[0]);
@@ -229,11 +225,11 @@ fn wings(plant: &Plant, track: &Track, commands: &Commands, stride: usize) -> Ve
             lead_servos(&over_step, &mut servo, clock.now().1, step_s);
         } else {
             through(&mut clock, span_s, Clock::next_wing_s, |clock, _, dt_s| {
-                lead(&mut servo, clock.now().1, dt_s);
+                lead_servos(&over(dt_s), &mut servo, clock.now().1, dt_s);
             });
         }
     }
-    let memory = (plant.wing_memory_s() / (stride as f64 * track.period_s)).ceil() as usize;
+    let memory = (plant.wing_memory_s() / step_s).ceil() as usize;
     let mut folded = usize::MAX;
     for moment in wings.iter_mut().rev() {
         let is_folded = moment.servo.iter().all(|servo| servo.deployment == 0.0);

@@ -37,8 +37,10 @@ impl PartialEq for StatesKey {
 
 impl StatesKey {
     fn of(plant: &Plant, motion: &Rc<Motion>, paths: &Paths) -> Self {
-        let wind = |height_m| {
-            if plant.wing_memory_s() == 0.0 { [0.0; 2] } else { plant.wind_m_s(height_m) }
+        let acting = plant.acting();
+        let wind = |height_m| match plant.wing_memory_s() {
+            0.0 => [0.0; 2],
+            _ => acting.numbers().wind(acting.present(), height_m),
         };
         Self {
             motion: Rc::clone(motion),
@@ -49,9 +51,18 @@ impl StatesKey {
     }
 }
 
+/// The states of a piece, side by side.
+pub(super) struct States {
+    /// At each moment.
+    now: SideBySide,
+    /// With the rotors of just before, where [`RotorPath::before`](super::actuators::RotorPath) has
+    /// them.
+    before: SideBySide,
+}
+
 /// Leads the plant along a piece and shows its state at each moment of the path, with the sample of
 /// the grid.
-pub(super) fn lead(
+fn lead(
     plant: &Plant,
     track: &Track,
     motion: &Motion,
@@ -81,20 +92,19 @@ pub(super) fn lead(
     }
 }
 
-/// The states of a piece. Behind that of a moment at which rotors accelerate with a jump stands one
-/// with the rotors of just before.
-fn states(plant: &Plant, track: &Track, motion: &Motion, path: Path<'_>) -> SideBySide {
-    let mut states = plant.side_by_side(path.len() + path.rotors.before.len());
-    let mut before = path.rotors.before.iter().peekable();
+fn states(plant: &Plant, track: &Track, motion: &Motion, path: Path<'_>) -> States {
+    let mut now = plant.side_by_side(path.len());
+    let mut before = plant.side_by_side(path.rotors.before.len());
+    let mut jumps = path.rotors.before.iter().peekable();
     lead(plant, track, motion, path, |k, state| {
-        states.push(state);
+        now.push(state);
         let moment = (k - path.first) / path.stride;
-        if let Some((_, before)) = before.next_if(|(jump, _)| *jump == moment) {
-            state.take_rotors(before);
-            states.push(state);
+        if let Some((_, rotors)) = jumps.next_if(|(jump, _)| *jump == moment) {
+            state.take_rotors(rotors);
+            before.push(state);
         }
     });
-    states
+    States { now, before }
 }
 
 impl Predictor<'_> {
@@ -112,29 +122,42 @@ impl Predictor<'_> {
         let path = paths.piece(piece, track);
         let states = self.states[piece]
             .get(StatesKey::of(plant, motion, paths), || states(plant, track, motion, path));
+        let mut led = plant.led_at(&states.now);
+        // A rotor's acceleration jumps with its command: what a sample stands for lies half before
+        // and half after the jump.
+        for ((moment, _), before) in path.rotors.before.iter().zip(plant.led_at(&states.before)) {
+            let a = &mut led[*moment].angular_acceleration;
+            *a = (*a + before.angular_acceleration) * 0.5;
+        }
+        let turned = drag.map(|drag| drag.turns(plant, &states.now));
         let effects = plant.effects();
         let [rate_scale, _] = track.scales(effects);
-        let turned = drag.map_or(Vec::new(), |drag| drag.turns(plant, &states));
-        let mut led = plant.led_at(&states).into_iter().enumerate();
-        let mut before = path.rotors.before.iter().peekable();
-        let mut predicted = Vec::with_capacity(path.len());
-        for moment in 0..path.len() {
-            let Some((i, now)) = led.next() else { break };
-            let mut a = now.angular_acceleration;
-            // A rotor's acceleration jumps with its command: what a sample stands for lies half
-            // before and half after the jump.
-            if before.next_if(|(jump, _)| *jump == moment).is_some()
-                && let Some((_, earlier)) = led.next()
-            {
-                a = (a + earlier.angular_acceleration) * 0.5;
+        let shown = path.moments().zip(led).enumerate().map(|(i, ((k, ..), led))| {
+            let f = track.as_shown(k, led.specific_force.vector, motion, effects);
+            let turned = turned.as_ref().map_or_else(Vector3::zeros, |turned| turned[i]);
+            let a = (led.angular_acceleration.vector + turned).component_mul(&rate_scale);
+            Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z)
+        });
+        shown.collect()
+    }
+
+    /// The plant's state at some samples of a piece, in order: led there along the measured motion.
+    pub(crate) fn led_states(
+        &self,
+        plant: &Plant,
+        piece: usize,
+        motion: &Motion,
+        samples: &[usize],
+    ) -> Vec<PlantState> {
+        let track = &self.tracks[piece];
+        let paths = self.paths.of(plant, &self.tracks, &self.commands, |_| 1);
+        let mut out = Vec::with_capacity(samples.len());
+        lead(plant, track, motion, paths.piece(piece, track), |k, state| {
+            if samples.get(out.len()) == Some(&k) {
+                out.push(*state);
             }
-            let k = path.first + moment * path.stride;
-            let f = track.as_shown(k, now.specific_force.vector, motion, effects);
-            let turned = turned.get(i).copied().unwrap_or_else(Vector3::zeros);
-            let a = (a.vector + turned).component_mul(&rate_scale);
-            predicted.push(Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z));
-        }
-        predicted
+        });
+        out
     }
 }
 

@@ -40,12 +40,12 @@ use actuators::{KeptPaths, stride};
 use drag_centre::DragCentre;
 use hypothesis::Asked;
 use kept::Kept;
-use led::StatesKey;
+use led::{States, StatesKey};
 use nalgebra::{Vector3, Vector6};
 use squirrel_core::effects::Effects;
 use squirrel_core::vehicle::PerRotor;
 use squirrel_log::FlightLog;
-use squirrel_sim::plant::{Plant, PlantState, SideBySide, WingPlant};
+use squirrel_sim::plant::{Plant, WingPlant};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::ops::Range;
 use std::rc::Rc;
@@ -103,7 +103,7 @@ pub(crate) struct Predictor<'a> {
     motions: Vec<Kept<(SensorPath, SensorErrors), Motion>>,
     paths: KeptPaths,
     /// Of each track, the last states that a plant was led to.
-    states: Vec<Kept<StatesKey, SideBySide>>,
+    states: Vec<Kept<StatesKey, States>>,
     /// Of each track, the last residuals of its dynamics.
     dynamics: Vec<Kept<Asked, Vec<Vector6<f64>>, ANSWERS>>,
 }
@@ -486,25 +486,6 @@ impl<'a> Predictor<'a> {
     /// The commands of a flight as the vehicle got them, from a time on.
     pub(crate) fn clock(&self, flight: usize, effects: &Effects<f64>, time_s: f64) -> Clock<'_> {
         self.commands[flight].clock(effects, time_s)
-    }
-
-    /// The plant's state at some samples of a piece, in order: led there along the measured motion.
-    pub(crate) fn led_states(
-        &self,
-        plant: &Plant,
-        piece: usize,
-        motion: &Motion,
-        samples: &[usize],
-    ) -> Vec<PlantState> {
-        let track = &self.tracks[piece];
-        let paths = self.paths.of(plant, &self.tracks, &self.commands, |_| 1);
-        let mut out = Vec::with_capacity(samples.len());
-        led::lead(plant, track, motion, paths.piece(piece, track), |k, state| {
-            if samples.get(out.len()) == Some(&k) {
-                out.push(*state);
-            }
-        });
-        out
     }
 }
 

@@ -10,7 +10,7 @@
 //! too, so that a perfect log gives the same swing, while the model's own prediction would feed
 //! each of its errors to the load. It is known when the next motion arrives.
 
-use super::{Membrane, Plant, PlantState, ServoState, WingPlant};
+use super::{Membrane, Plant, PlantState, WingPlant, lead_servos};
 use squirrel_core::aero::Air;
 use squirrel_core::dynamics::servo::Servo;
 use squirrel_core::dynamics::{self, RotorDrive, State, rk4};
@@ -46,22 +46,6 @@ impl PlantState {
     }
 }
 
-/// Moves wing servos under a command.
-///
-/// * `servo` - over `dt_s`
-/// * `wing_command` - left, right, 0..1
-pub fn lead_servos(
-    servo: &Servo<f64>,
-    servos: &mut [ServoState; 2],
-    wing_command: [f64; 2],
-    dt_s: f64,
-) {
-    for (state, command) in servos.iter_mut().zip(wing_command) {
-        state.ask(command.clamp(0.0, 1.0), servo.dead_time_s);
-        servo.lead_one(state, dt_s);
-    }
-}
-
 impl Plant {
     /// What the plant says at a measured motion, in air that moves only by effects; then moves on
     /// what is not measured (rotors, wing servos, membrane, slung load) under held commands. The
@@ -87,8 +71,8 @@ impl Plant {
         self.meet(state, motion, &rotors, swing.as_ref());
         let (led, before) = (self.led(state), state.deployment());
         self.lead_rotors(state, dt_s);
-        if let Some(servo) = self.servos_over(dt_s).filter(|_| dt_s > 0.0) {
-            lead_servos(&servo, &mut state.servo, wing_command, dt_s);
+        if let Some(over) = self.servos().filter(|_| dt_s > 0.0) {
+            lead_servos(&over(dt_s), &mut state.servo, wing_command, dt_s);
         }
         self.pass(state, Some([before, state.deployment()]), dt_s);
         led
@@ -118,10 +102,10 @@ impl Plant {
         }
     }
 
-    /// The wing servos over a time, s; `None` without wings.
-    pub fn servos_over(&self, dt_s: f64) -> Option<Servo<f64>> {
-        let servo = self.wing.servo()?;
-        Some(servo.over(self.effects.wing_extra_time_constant_s(), dt_s))
+    /// The wing servos over steps of a length, s; `None` without wings.
+    pub fn servos(&self) -> Option<impl Fn(f64) -> Servo<f64> + use<>> {
+        let extra_s = self.effects.wing_extra_time_constant_s();
+        self.wing.servo().map(|servo| move |dt_s| servo.over(extra_s, dt_s))
     }
 
     /// Puts a state into a measured motion with the rotors as they are there; a slung load has swung
@@ -167,11 +151,6 @@ impl Plant {
         let scale = self.effects.accel_scale().vector.add_scalar(1.0);
         In::new(specific_force.vector.component_mul(&scale))
             + self.effects.specific_force_bias(time_s)
-    }
-
-    /// Wind of the effects, north and east, m/s.
-    pub fn wind_m_s(&self, height_m: f64) -> [f64; 2] {
-        self.acting.numbers().wind(self.acting.present(), height_m)
     }
 
     /// Time after which nothing is left of what the wings went through, s.

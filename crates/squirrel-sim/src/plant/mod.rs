@@ -15,10 +15,10 @@ mod wind;
 
 pub use battery::{BatteryParameters, BatteryState};
 pub use jacobian::{Jacobian, VARIABLES};
-pub use lead::{Led, Rotors, lead_servos};
+pub use lead::{Led, Rotors};
 pub use membrane::{Membrane, MembraneParameters, MembraneState};
 pub use parnn_wing::{ParnnWing, ParnnWingState};
-pub use servo::{ServoParameters, ServoState};
+pub use servo::{ServoParameters, ServoState, lead_servos};
 pub use side_by_side::SideBySide;
 pub use wind::{GustModel, Meeting, Wind, WindParameters};
 
@@ -392,14 +392,8 @@ impl Plant {
     /// Mean deployment over a step.
     #[inline(always)]
     fn deploy(&self, state: &mut PlantState, command: [f64; 2]) -> [f64; 2] {
-        let mut mean = [0.0; 2];
-        let Some(servo) = &self.servo else { return mean };
-        for side in 0..2 {
-            let state = &mut state.servo[side];
-            state.ask(command[side].clamp(0.0, 1.0), servo.dead_time_s);
-            mean[side] = servo.lead_one(state, self.dt_s);
-        }
-        mean
+        let Some(servo) = &self.servo else { return [0.0; 2] };
+        lead_servos(servo, &mut state.servo, command, self.dt_s)
     }
 
     /// Wrench of the wings alone at a deployment, left and right.

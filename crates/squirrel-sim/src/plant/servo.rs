@@ -17,6 +17,25 @@ pub struct ServoParameters {
 /// What one servo remembers.
 pub type ServoState = servo::ServoState<f64>;
 
+/// Moves wing servos under a command; their mean deployment, left and right, on the way.
+///
+/// * `servo` - over steps of `dt_s`
+/// * `command` - left, right, 0..1
+#[inline]
+pub fn lead_servos(
+    servo: &Servo<f64>,
+    servos: &mut [ServoState; 2],
+    command: [f64; 2],
+    dt_s: f64,
+) -> [f64; 2] {
+    let mut mean = [0.0; 2];
+    for side in 0..2 {
+        servos[side].ask(command[side].clamp(0.0, 1.0), servo.dead_time_s);
+        mean[side] = servo.lead_one(&mut servos[side], dt_s);
+    }
+    mean
+}
+
 impl ServoParameters {
     pub(crate) fn check(&self) -> Result<(), SettingError> {
         if !(0.0..=1.0).contains(&self.dead_time_s) {
@@ -62,6 +81,23 @@ mod tests {
     fn lead(servo: &Servo<f64>, state: &mut ServoState, command: f64, dt_s: f64) {
         state.ask(command.clamp(0.0, 1.0), servo.dead_time_s);
         servo.lead(state, dt_s);
+    }
+
+    /// The short way of one servo has the bits of the way that registers go.
+    #[test]
+    fn one_servo_moves_as_on_registers() {
+        let servo =
+            ServoParameters { dead_time_s: 0.021, rate_max_per_s: 6.0, time_constant_s: 0.03 };
+        let over = servo.over([0.0, 0.2], 0.004);
+        let mut alone = ServoState::at_rest();
+        let mut other = alone;
+        for step in 0..1000 {
+            let command = [1.0, 0.4, 0.45, 0.0][step / 100 % 4];
+            alone.ask(command, over.dead_time_s);
+            other.ask(command, over.dead_time_s);
+            let means = [over.lead_one(&mut alone, 0.004), over.lead(&mut other, 0.004)];
+            assert_eq!((means[0], alone), (means[1], other), "{step}");
+        }
     }
 
     fn opening_time(servo: &ServoParameters, to: f64) -> f64 {

@@ -85,13 +85,13 @@ impl Plant {
             return states.network.iter().flatten().map(stopped).collect();
         };
         let place_m = self.effects.accelerometer_position().vector.into();
+        let (whole, path) = (&whole, Path::best());
         let mut led = Vec::with_capacity(states.states);
         for blocks in states.rows.chunks(BLOCKS) {
-            let whole = &whole;
             let felt = if matches!(self.wing, WingPlant::Membrane { .. }) {
-                f64::run(Path::best(), Ask::<ROTORS, MEMBRANE> { whole, blocks, still, place_m })
+                f64::run(path, Ask::<ROTORS, MEMBRANE> { whole, blocks, still, place_m })
             } else {
-                f64::run(Path::best(), Ask::<ROTORS, FLAT> { whole, blocks, still, place_m })
+                f64::run(path, Ask::<ROTORS, FLAT> { whole, blocks, still, place_m })
             };
             for (rows, [force, moment, specific, turning]) in blocks.iter().zip(&felt) {
                 for lane in 0..BLOCK.min(states.states - led.len()) {
