@@ -1,5 +1,6 @@
 //! Flights in which one thing fails, and studies that are stopped.
 
+use crate::recorded::{self, number};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
@@ -16,20 +17,44 @@ fn study_of(together: u32, trials: u32, folder: Option<&Path>) -> Faults {
     run(&plan, together, &Keep { folder, ..Keep::default() }).unwrap().unwrap()
 }
 
+/// Of a thousand flights, by fault.
 #[test]
 fn survivable_faults_are_survived_and_what_is_lost_is_flagged() {
-    let study = study(1000, None);
-    assert!(study.survived_share >= 0.99, "{:#?}", study.rows);
-    assert_eq!(study.rows.len(), 10);
-    for row in &study.rows {
-        assert!(row.not_finite == 0 && row.lost_unflagged == 0, "{row:?}");
+    let share = number("faults", "survived_share");
+    assert!(share >= 0.99, "{share}");
+    let rows = recorded::at("faults", "rows").as_array().unwrap();
+    assert_eq!(rows.len(), 10);
+    for row in rows {
+        assert!(row["not_finite"] == 0 && row["lost_unflagged"] == 0, "{row}");
         // A hundred flights of each; about half of the weak rotors have too little thrust to spare.
-        assert!(row.flights == 100 && row.survivable >= 35, "{row:?}");
+        assert!(row["flights"] == 100 && row["survivable"].as_u64().unwrap() >= 35, "{row}");
     }
-    let flagged = |fault: &str| study.rows.iter().find(|row| row.fault == fault).unwrap().flagged;
     for fault in ["imu_spike", "imu_stuck", "imu_nan", "imu_dead", "motor_weak"] {
-        assert!(flagged(fault) >= 95, "{fault}: {}", flagged(fault));
+        let flagged = number("faults", &format!("rows[fault={fault}]/flagged"));
+        assert!(flagged >= 95.0, "{fault}: {flagged}");
     }
+}
+
+/// Of five hundred flights.
+#[test]
+fn two_faults_at_once_are_survived_nineteen_times_of_twenty() {
+    let share = number("faults_together", "survived_share");
+    assert!(share >= 0.95, "{share}");
+    let rows = recorded::at("faults_together", "rows").as_array().unwrap();
+    for row in rows {
+        assert!(row["not_finite"] == 0 && row["lost_unflagged"] == 0, "{row}");
+    }
+    let sum = |of: &str| rows.iter().map(|row| row[of].as_u64().unwrap()).sum::<u64>();
+    assert_eq!(sum("flights"), 500);
+    let (costly, flagged) = (sum("costly"), sum("costly_flagged"));
+    assert!(5 * flagged >= 4 * costly, "{flagged} of {costly} costly wings are flagged");
+}
+
+/// Other flights than those of the record: each fault ten times.
+#[test]
+fn what_fails_is_named() {
+    let study = study(100, None);
+    assert!(study.rows.iter().all(|row| row.flights == 10 && row.lost_unflagged == 0));
     for (k, flight) in study.flights.iter().enumerate() {
         let names = |flag: &str| flight.flags.iter().any(|f| f == flag);
         // A unit that is gone is named by its number.
@@ -41,19 +66,8 @@ fn survivable_faults_are_survived_and_what_is_lost_is_flagged() {
             assert!(names("gnss_lost") && names("position_lost"), "{k}: {flight:?}");
         }
     }
-}
-
-#[test]
-fn two_faults_at_once_are_survived_nineteen_times_of_twenty() {
-    let study = study_of(2, 500, None);
-    assert!(study.survived_share >= 0.95, "{:#?}", study.rows);
-    assert!(study.flights.iter().all(|flight| flight.faults.len() == 2));
-    for row in &study.rows {
-        assert!(row.not_finite == 0 && row.lost_unflagged == 0, "{row:?}");
-    }
-    let sum = |of: fn(&squirrel_study::faults::Row) -> u32| study.rows.iter().map(of).sum::<u32>();
-    let (costly, flagged) = (sum(|row| row.costly), sum(|row| row.costly_flagged));
-    assert!(5 * flagged >= 4 * costly, "{flagged} of {costly} costly wings are flagged");
+    let two = study_of(2, 20, None);
+    assert!(two.flights.iter().all(|flight| flight.faults.len() == 2));
     let plan = Plan::calm(VehicleFile::squirrel(), vec![Arm::TwccPlus], 4, 3);
     let error = run(&plan, 3, &Keep::default()).unwrap_err().to_string();
     assert_eq!(error, "--faults 3: must be 1 or 2");

@@ -10,6 +10,7 @@ mod pages;
 mod parts;
 mod planning;
 mod real_filters;
+mod recorded;
 mod statistics;
 mod table2;
 mod thrust;
