@@ -2,8 +2,9 @@
 //! flights.
 //!
 //! `SQUIRREL_CLAIMS_WRITE=1` flies them and writes it anew, with the size of each result of some
-//! trials. A test flies these trials again and compares: a program in which they have the same
-//! sizes is the one that the record is of.
+//! trials, and of the result of each study with a trial or two. A test flies these again and
+//! compares: a program in which they have the same sizes flies and counts as the one that the record
+//! is of.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -36,29 +37,47 @@ pub(crate) const STUDIES: [(&str, &str, &str); 7] = [
 /// Lists of single flights or cells: much, and no test asks for them.
 const LEFT_OUT: [&str; 3] = ["cells", "ends", "flights"];
 
+/// How much of a study is flown.
+#[derive(Clone, Copy)]
+enum Of {
+    /// What the record is of.
+    All,
+    /// A trial or two of some arms.
+    Few,
+}
+
 /// A study with its trials in a folder, or only kept there: then it has no result.
-fn fly(name: &str, keep: &Keep<'_>) -> Option<Value> {
+fn fly(name: &str, of: Of, keep: &Keep<'_>) -> Option<Value> {
     fn json<T: Serialize>(found: Option<T>) -> Option<Value> {
         found.map(|found| serde_json::to_value(found).unwrap())
     }
-    let of =
-        |arms: &[Arm], trials| Plan::calm(VehicleFile::squirrel(), arms.to_vec(), trials, SEED);
-    let all = |trials| of(&Arm::ALONE, trials);
+    let pick = |all: u32, few: u32| match of {
+        Of::All => all,
+        Of::Few => few,
+    };
+    let plan = |arms: &[Arm], all, few| {
+        Plan::calm(VehicleFile::squirrel(), arms.to_vec(), pick(all, few), SEED)
+    };
+    let arms: &[Arm] = match of {
+        Of::All => &Arm::ALONE,
+        Of::Few => &[Arm::Pc, Arm::Phantom, Arm::TwccFlat, Arm::TwccPlus, Arm::PcPlus],
+    };
+    let ours = &[Arm::TwccPlus];
     match name {
-        "faults" => json(faults::run(&of(&[Arm::TwccPlus], 1000), 1, keep).unwrap()),
-        "faults_together" => json(faults::run(&of(&[Arm::TwccPlus], 500), 2, keep).unwrap()),
-        "forest" => json(forest::run(&all(105), 2.0, keep).unwrap()),
-        "thrust" => json(thrust::run(&all(12), keep).unwrap()),
-        "table3" => json(table3::run(&all(12), keep).unwrap()),
-        "steering" => json(steering::run(&all(6), keep).unwrap()),
-        _ => json(table2::run(&all(5), EPOCHS, keep).unwrap()),
+        "faults" => json(faults::run(&plan(ours, 1000, 20), 1, keep).unwrap()),
+        "faults_together" => json(faults::run(&plan(ours, 500, 20), 2, keep).unwrap()),
+        "forest" => json(forest::run(&plan(arms, 105, 2), 2.0, keep).unwrap()),
+        "thrust" => json(thrust::run(&plan(arms, 12, 2), keep).unwrap()),
+        "table3" => json(table3::run(&plan(arms, 12, 2), keep).unwrap()),
+        "steering" => json(steering::run(&plan(arms, 6, 1), keep).unwrap()),
+        _ => json(table2::run(&plan(arms, 5, 2), pick(EPOCHS as u32, 2) as usize, keep).unwrap()),
     }
 }
 
 /// Flies all studies and writes what they have found, a line each.
 pub(crate) fn write() {
     let line = |name: &str| {
-        let found = short(fly(name, &Keep::default()).unwrap());
+        let found = short(fly(name, Of::All, &Keep::default()).unwrap());
         format!("\"{name}\": {}", serde_json::to_string(&found).unwrap())
     };
     let lines = STUDIES.map(|(name, ..)| line(name)).join(",\n");
@@ -126,7 +145,7 @@ pub(crate) fn find<'a>(mut at: &'a Value, path: &str) -> &'a Value {
     at
 }
 
-/// The sampled trials, flown: study and trial, and size of the result.
+/// The sampled trials and the small studies, flown: names and sizes of the results.
 pub(crate) fn sampled() -> Vec<(String, f64)> {
     let mut lines = Vec::new();
     for (name, journal, part) in STUDIES {
@@ -134,7 +153,10 @@ pub(crate) fn sampled() -> Vec<(String, f64)> {
         let _ = fs::remove_dir_all(&folder);
         fs::create_dir_all(&folder).unwrap();
         let part = Part::Shard(part.parse().unwrap());
-        assert_eq!(fly(name, &Keep { folder: Some(&folder), part, ..Keep::default() }), None);
+        assert_eq!(
+            fly(name, Of::All, &Keep { folder: Some(&folder), part, ..Keep::default() }),
+            None
+        );
         let journal = fs::read_to_string(folder.join(format!("{journal}.trials.jsonl"))).unwrap();
         let mut trials: Vec<(u64, f64)> = journal
             .lines()
@@ -147,6 +169,8 @@ pub(crate) fn sampled() -> Vec<(String, f64)> {
         trials.sort_by_key(|(trial, _)| *trial);
         lines.extend(trials.into_iter().map(|(trial, size)| (format!("{name} {trial}"), size)));
         fs::remove_dir_all(&folder).unwrap();
+        let few = fly(name, Of::Few, &Keep::default()).unwrap();
+        lines.push((format!("{name} few"), size(&few)));
     }
     lines
 }
