@@ -5,7 +5,7 @@
 //! first entry that has these. The format is `%1` for percent with one digit or `.2` for a number
 //! with two. The studies are those of `recorded`.
 
-use crate::recorded::{self, find, number};
+use crate::recorded::{self, as_number, find, number};
 use serde_json::Value;
 use squirrel_core::stack::wire::{HASH_START, hash};
 use squirrel_sim::arm::Arm;
@@ -27,7 +27,7 @@ const IDS: [&str; 21] = [
 const ALIKE: f64 = 1e-6;
 
 fn figure(value: &Value, path: &str, format: &str) -> String {
-    let x = value.as_f64().unwrap_or_else(|| panic!("{path}: {value} is no number"));
+    let x = as_number(value, path);
     let digits: usize = format[1..].parse().unwrap();
     let x = if format.starts_with('%') { 100.0 * x } else { x };
     // What rounds to zero has no sign.

@@ -24,7 +24,7 @@ const SEED: u64 = 11;
 
 /// Studies, the names of their journals, and of so many trials of each one is flown again: about
 /// thirty flights of each, and one training.
-pub(crate) const STUDIES: [(&str, &str, &str); 7] = [
+const RECORDED: [(&str, &str, &str); 7] = [
     ("faults", "faults", "1/31"),
     ("faults_together", "faults", "1/17"),
     ("forest", "forest", "1/113"),
@@ -46,22 +46,25 @@ enum Of {
     Few,
 }
 
+impl Of {
+    fn pick<T>(self, all: T, few: T) -> T {
+        match self {
+            Self::All => all,
+            Self::Few => few,
+        }
+    }
+}
+
 /// A study with its trials in a folder, or only kept there: then it has no result.
 fn fly(name: &str, of: Of, keep: &Keep<'_>) -> Option<Value> {
     fn json<T: Serialize>(found: Option<T>) -> Option<Value> {
         found.map(|found| serde_json::to_value(found).unwrap())
     }
-    let pick = |all: u32, few: u32| match of {
-        Of::All => all,
-        Of::Few => few,
-    };
     let plan = |arms: &[Arm], all, few| {
-        Plan::calm(VehicleFile::squirrel(), arms.to_vec(), pick(all, few), SEED)
+        Plan::calm(VehicleFile::squirrel(), arms.to_vec(), of.pick(all, few), SEED)
     };
-    let arms: &[Arm] = match of {
-        Of::All => &Arm::ALONE,
-        Of::Few => &[Arm::Pc, Arm::Phantom, Arm::TwccFlat, Arm::TwccPlus, Arm::PcPlus],
-    };
+    let few = [Arm::Pc, Arm::Phantom, Arm::TwccFlat, Arm::TwccPlus, Arm::PcPlus];
+    let arms = of.pick(&Arm::ALONE[..], &few);
     let ours = &[Arm::TwccPlus];
     match name {
         "faults" => json(faults::run(&plan(ours, 1000, 20), 1, keep).unwrap()),
@@ -70,7 +73,7 @@ fn fly(name: &str, of: Of, keep: &Keep<'_>) -> Option<Value> {
         "thrust" => json(thrust::run(&plan(arms, 12, 2), keep).unwrap()),
         "table3" => json(table3::run(&plan(arms, 12, 2), keep).unwrap()),
         "steering" => json(steering::run(&plan(arms, 6, 1), keep).unwrap()),
-        _ => json(table2::run(&plan(arms, 5, 2), pick(EPOCHS as u32, 2) as usize, keep).unwrap()),
+        _ => json(table2::run(&plan(arms, 5, 2), of.pick(EPOCHS, 2), keep).unwrap()),
     }
 }
 
@@ -80,7 +83,7 @@ pub(crate) fn write() {
         let found = short(fly(name, Of::All, &Keep::default()).unwrap());
         format!("\"{name}\": {}", serde_json::to_string(&found).unwrap())
     };
-    let lines = STUDIES.map(|(name, ..)| line(name)).join(",\n");
+    let lines = RECORDED.map(|(name, ..)| line(name)).join(",\n");
     fs::write(file(), format!("{{\n{lines}\n}}\n")).unwrap();
 }
 
@@ -105,22 +108,26 @@ pub(crate) fn file() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/studies.json")
 }
 
-/// All studies as they were recorded.
-pub(crate) fn all() -> &'static BTreeMap<String, Value> {
-    static ALL: OnceLock<BTreeMap<String, Value>> = OnceLock::new();
-    ALL.get_or_init(|| serde_json::from_slice(&fs::read(file()).unwrap()).unwrap())
-}
-
 /// What is at a path of a recorded study.
 pub(crate) fn at(study: &str, path: &str) -> &'static Value {
-    find(&all()[study], path)
+    static ALL: OnceLock<BTreeMap<String, Value>> = OnceLock::new();
+    let all = ALL.get_or_init(|| serde_json::from_slice(&fs::read(file()).unwrap()).unwrap());
+    find(all.get(study).unwrap_or_else(|| panic!("{study}: no study of the record")), path)
 }
 
-/// A number at a path of a recorded study; what is true counts as 1.
+/// A number at a path of a recorded study.
 pub(crate) fn number(study: &str, path: &str) -> f64 {
-    let found = at(study, path);
-    let is = found.as_bool().map(f64::from);
-    found.as_f64().or(is).unwrap_or_else(|| panic!("{study} {path}: {found} is no number"))
+    as_number(at(study, path), path)
+}
+
+/// A number at a path of a value.
+pub(crate) fn number_in(value: &Value, path: &str) -> f64 {
+    as_number(find(value, path), path)
+}
+
+/// What was found at a path, as a number.
+pub(crate) fn as_number(found: &Value, path: &str) -> f64 {
+    found.as_f64().unwrap_or_else(|| panic!("{path}: {found} is no number"))
 }
 
 /// What is at a path.
@@ -148,7 +155,7 @@ pub(crate) fn find<'a>(mut at: &'a Value, path: &str) -> &'a Value {
 /// The sampled trials and the small studies, flown: names and sizes of the results.
 pub(crate) fn sampled() -> Vec<(String, f64)> {
     let mut lines = Vec::new();
-    for (name, journal, part) in STUDIES {
+    for (name, journal, part) in RECORDED {
         let folder = std::env::temp_dir().join(format!("squirrel-claims-{name}-{}", process::id()));
         let _ = fs::remove_dir_all(&folder);
         fs::create_dir_all(&folder).unwrap();

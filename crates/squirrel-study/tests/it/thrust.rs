@@ -1,6 +1,6 @@
 //! What the studies of the avoidance manoeuvre show, of the record.
 
-use crate::recorded::{self, number};
+use crate::recorded::{self, number, number_in};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
@@ -69,11 +69,10 @@ fn the_better_controller_gains_more_than_the_paper_at_scarce_thrust() {
     assert_eq!(points.len(), 4);
     for point in points {
         let ratio = &point["thrust_to_weight"];
-        let ours = |what: &str| recorded::find(point, &format!("rows[arm=twcc_plus]/{what}"));
-        let figure = |what: &str| ours(what).as_f64().unwrap();
-        let gain = figure("gain_measured/low");
+        let ours = |what: &str| number_in(point, &format!("rows[arm=twcc_plus]/{what}"));
+        let gain = ours("gain_measured/low");
         assert!(gain > 0.131, "{ratio}: {gain}");
-        let over = figure("gain_over_pc_plus/low");
+        let over = ours("gain_over_pc_plus/low");
         assert!(over > 0.0, "{ratio}: {over}");
         let rows = point["rows"].as_array().unwrap();
         assert_eq!(rows.len(), Arm::ALONE.len());
@@ -82,9 +81,8 @@ fn the_better_controller_gains_more_than_the_paper_at_scarce_thrust() {
             if arm.ends_with("_plus") || arm.ends_with("_ff") || arm == "indi" {
                 continue;
             }
-            let [measured, flown] =
-                ["rmse_measured_m", "rmse_m"].map(|what| row[what].as_f64().unwrap());
-            assert!(figure("rmse_measured_m") < measured, "{ratio}: {arm}");
+            let [measured, flown] = ["rmse_measured_m", "rmse_m"].map(|what| number_in(row, what));
+            assert!(ours("rmse_measured_m") < measured, "{ratio}: {arm}");
             // What the log has is near what was flown, but not the same.
             assert!((measured - flown).abs() < 0.2 && measured != flown, "{ratio}: {arm}");
         }
