@@ -72,7 +72,11 @@ fn fly(name: &str, of: Of, keep: &Keep<'_>) -> Option<Value> {
         "forest" => json(forest::run(&plan(arms, 105, 2), 2.0, keep).unwrap()),
         "thrust" => json(thrust::run(&plan(arms, 12, 2), keep).unwrap()),
         "table3" => json(table3::run(&plan(arms, 12, 2), keep).unwrap()),
-        "steering" => json(steering::run(&plan(arms, 6, 1), keep).unwrap()),
+        "steering" => {
+            // Of 80 cells an arm.
+            let arms = of.pick(arms, &[Arm::Pc, Arm::TwccParnn]);
+            json(steering::run(&plan(arms, 6, 1), keep).unwrap())
+        }
         _ => json(table2::run(&plan(arms, 5, 2), of.pick(EPOCHS, 2), keep).unwrap()),
     }
 }
