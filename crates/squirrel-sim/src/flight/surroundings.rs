@@ -11,14 +11,31 @@ use squirrel_core::stack::MAX_OBSTACLES;
 const HORIZON_M: f64 = 50.0;
 /// Way after which it is found out anew which are near, m.
 const STALE_M: f64 = 10.0;
+/// Way after which it is found out anew which of the near ones may be handed on, m.
+const STEP_M: f64 = 1.0;
 /// So few are always near.
 const FEW: usize = 64;
 
 /// All obstacles, and those near a place.
 pub(super) struct Surroundings {
     all: Vec<[f64; 3]>,
-    near: Vec<usize>,
+    near: Picked,
+    /// Of the near ones, those that may be among the [`MAX_OBSTACLES`] nearest within a step.
+    nearest: Picked,
+}
+
+/// Numbers of obstacles, and where the vehicle was when they were picked.
+#[derive(Default)]
+struct Picked {
+    numbers: Vec<usize>,
     place: Option<Vector2<f64>>,
+}
+
+impl Picked {
+    /// Not for this place: none picked yet, or picked further away than this.
+    fn is_stale(&self, place: Vector2<f64>, way_m: f64) -> bool {
+        self.place.is_none_or(|before| !((place - before).norm() < way_m))
+    }
 }
 
 fn apart(obstacle: &[f64; 3], place: Vector2<f64>) -> f64 {
@@ -28,7 +45,7 @@ fn apart(obstacle: &[f64; 3], place: Vector2<f64>) -> f64 {
 impl Surroundings {
     /// * `all` - north, east, radius, m
     pub(super) fn new(all: Vec<[f64; 3]>) -> Self {
-        Self { all, near: Vec::new(), place: None }
+        Self { all, near: Picked::default(), nearest: Picked::default() }
     }
 
     pub(super) fn all(&self) -> &[[f64; 3]] {
@@ -37,15 +54,35 @@ impl Surroundings {
 
     /// Those within the horizon of a place, and all where there are few, with their numbers.
     pub(super) fn near(&mut self, place: Vector2<f64>) -> impl Iterator<Item = (usize, &[f64; 3])> {
-        if self.place.is_none_or(|before| !((place - before).norm() < STALE_M)) {
+        if self.near.is_stale(place, STALE_M) {
             let reach_m = HORIZON_M + STALE_M;
             let is_near = |obstacle: &[f64; 3]| {
                 self.all.len() <= FEW || apart(obstacle, place) < reach_m * reach_m
             };
-            self.near = (0..self.all.len()).filter(|i| is_near(&self.all[*i])).collect();
-            self.place = Some(place);
+            let numbers = (0..self.all.len()).filter(|i| is_near(&self.all[*i])).collect();
+            self.near = Picked { numbers, place: Some(place) };
+            self.nearest = Picked::default();
         }
-        self.near.iter().map(|i| (*i, &self.all[*i]))
+        self.near.numbers.iter().map(|i| (*i, &self.all[*i]))
+    }
+
+    /// Picks those that may be among the nearest: hundreds are near, and the flight code asks 300
+    /// times a second. On a step's way the distance of one grows and that of another shrinks by the
+    /// step at most, so that none beyond two steps more than the last handed on comes before it.
+    fn pick_nearest(&mut self, place: Vector2<f64>) {
+        if !self.near.is_stale(place, STALE_M) && !self.nearest.is_stale(place, STEP_M) {
+            return;
+        }
+        let mut squares: Vec<(f64, usize)> =
+            self.near(place).map(|(i, obstacle)| (apart(obstacle, place), i)).collect();
+        if squares.len() > MAX_OBSTACLES {
+            let (_, last, _) =
+                squares.select_nth_unstable_by(MAX_OBSTACLES - 1, |a, b| a.0.total_cmp(&b.0));
+            let reach_m = last.0.sqrt() + 2.0 * STEP_M;
+            squares.retain(|(square, _)| !(*square > reach_m * reach_m));
+        }
+        let numbers = squares.iter().map(|(_, i)| *i).collect();
+        self.nearest = Picked { numbers, place: Some(place) };
     }
 
     /// The nearest ones where the flight code takes them to be: it sees them from where it is, and
@@ -58,19 +95,16 @@ impl Surroundings {
         let at = body.position.vector;
         let off =
             believed.map_or(Vector3::zeros(), |terms| terms.position.vector.cast::<f64>() - at);
+        self.pick_nearest(at.xy());
         let mut near: Vec<(f64, usize)> = self
-            .near(at.xy())
-            .map(|(i, obstacle)| (apart(obstacle, at.xy()), i))
+            .nearest
+            .numbers
+            .iter()
+            .map(|i| (apart(&self.all[*i], at.xy()), *i))
             .filter(|(square, _)| *square < HORIZON_M * HORIZON_M)
             .collect();
-        let order = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-        // Hundreds are within the horizon, 300 times a second: only those that are handed on are put
-        // in order.
-        if near.len() > MAX_OBSTACLES {
-            near.select_nth_unstable_by(MAX_OBSTACLES, order);
-            near.truncate(MAX_OBSTACLES);
-        }
-        near.sort_unstable_by(order);
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near.truncate(MAX_OBSTACLES);
         near.iter()
             .map(|(_, i)| {
                 let [north, east, _] = self.all[*i];
@@ -81,5 +115,46 @@ impl Surroundings {
                 }
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+
+    /// What is handed on along a way through a dense forest, by whole sorting at each step: over
+    /// jumps, standing still, and out to where fewer than are handed on are within the horizon.
+    #[test]
+    fn seen_are_the_nearest_of_all() {
+        let mut draw = Pcg64Mcg::seed_from_u64(21);
+        let all: Vec<[f64; 3]> = (0..3000)
+            .map(|_| [draw.random_range(-80.0..80.0), draw.random_range(-80.0..80.0), 0.2])
+            .collect();
+        let mut surroundings = Surroundings::new(all.clone());
+        let mut body = State::<f64>::at_rest();
+        let mut few = 0;
+        for step in 0..20_000 {
+            let way_m = if step % 997 == 0 { 15.0 } else { f64::from(step % 4) * 0.02 };
+            let towards: f64 = draw.random_range(-1.2..1.8);
+            body.position.vector += Vector3::new(towards.cos(), towards.sin(), 0.0) * way_m;
+            if body.position.vector.norm() > 140.0 {
+                body.position.vector = -body.position.vector;
+            }
+            let at = body.position.vector.xy();
+            let mut nearest: Vec<(f64, usize)> = (0..all.len())
+                .map(|i| (apart(&all[i], at), i))
+                .filter(|(square, _)| *square < HORIZON_M * HORIZON_M)
+                .collect();
+            nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let expected: Vec<u32> =
+                nearest.iter().take(MAX_OBSTACLES).map(|(_, i)| *i as u32).collect();
+            let seen: Vec<u32> =
+                surroundings.seen(&body, None).iter().map(|obstacle| obstacle.id).collect();
+            few += usize::from(seen.len() < MAX_OBSTACLES);
+            assert_eq!(seen, expected, "step {step} at {at}");
+        }
+        assert!(few > 100, "the way leaves the forest: {few}");
     }
 }
