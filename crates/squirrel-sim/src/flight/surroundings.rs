@@ -54,23 +54,30 @@ impl Surroundings {
 
     /// Those within the horizon of a place, and all where there are few, with their numbers.
     pub(super) fn near(&mut self, place: Vector2<f64>) -> impl Iterator<Item = (usize, &[f64; 3])> {
-        if self.near.is_stale(place, STALE_M) {
-            let reach_m = HORIZON_M + STALE_M;
-            let is_near = |obstacle: &[f64; 3]| {
-                self.all.len() <= FEW || apart(obstacle, place) < reach_m * reach_m
-            };
-            let numbers = (0..self.all.len()).filter(|i| is_near(&self.all[*i])).collect();
-            self.near = Picked { numbers, place: Some(place) };
-            self.nearest = Picked::default();
-        }
+        self.pick_near(place);
         self.near.numbers.iter().map(|i| (*i, &self.all[*i]))
+    }
+
+    fn pick_near(&mut self, place: Vector2<f64>) {
+        if !self.near.is_stale(place, STALE_M) {
+            return;
+        }
+        let reach_m = HORIZON_M + STALE_M;
+        let is_near = |obstacle: &[f64; 3]| {
+            self.all.len() <= FEW || apart(obstacle, place) < reach_m * reach_m
+        };
+        let numbers = (0..self.all.len()).filter(|i| is_near(&self.all[*i])).collect();
+        self.near = Picked { numbers, place: Some(place) };
+        // Picked out of the near ones of another place, which may lack some of the horizon here.
+        self.nearest = Picked::default();
     }
 
     /// Picks those that may be among the nearest: hundreds are near, and the flight code asks 300
     /// times a second. On a step's way the distance of one grows and that of another shrinks by the
     /// step at most, so that none beyond two steps more than the last handed on comes before it.
     fn pick_nearest(&mut self, place: Vector2<f64>) {
-        if !self.near.is_stale(place, STALE_M) && !self.nearest.is_stale(place, STEP_M) {
+        self.pick_near(place);
+        if !self.nearest.is_stale(place, STEP_M) {
             return;
         }
         let mut squares: Vec<(f64, usize)> =
