@@ -315,7 +315,7 @@ impl TableFile for BinFile<'_> {
         let rows = self.message.records(&self.bytes, self.instance);
         let records = rows.records.iter().copied();
         let mut table =
-            Table::of_records(self.name, &self.message.columns, &self.names, wanted, &records)?;
+            Table::of_records(self.name, &self.message.columns, &self.names, wanted, records)?;
         self.meter.add(self.bytes.len());
         table.bytes_cut = self.bytes_cut as u64;
         Ok(table)

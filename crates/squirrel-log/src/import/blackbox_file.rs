@@ -7,6 +7,7 @@
 //! one behind it, where the firmware has the intra frame alone, so that gyroscope and accelerometer
 //! are off from there to the next intra frame; and it refuses firmware that it does not know.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -112,9 +113,9 @@ impl Rows for Frames {
         self.walked.frames
     }
 
-    fn column(&self, name: &str) -> Option<Vec<f64>> {
+    fn column(&self, name: &str) -> Option<Cow<'_, [f64]>> {
         let (_, values) = self.columns.iter().find(|(column, _)| column == name)?;
-        Some(values.clone())
+        Some(values.into())
     }
 }
 
@@ -197,7 +198,8 @@ impl TableFile for BlackboxFile<'_> {
             return Err(ImportError::HeaderOnly { file: self.name });
         }
         let rows = (1..=frames.walked.frames as u64).collect();
-        let values = wanted.iter().map(|name| frames.column(name).unwrap_or_default()).collect();
+        let values = |name: &&str| frames.column(name).map_or_else(Vec::new, Cow::into_owned);
+        let values = wanted.iter().map(values).collect();
         let mut table = Table::new(self.name, wanted, values, rows);
         table.bytes_cut = frames.walked.bytes_lost as u64;
         Ok(table)

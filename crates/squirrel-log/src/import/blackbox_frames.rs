@@ -12,6 +12,8 @@ const STEP_MAX_US: u32 = 10_000_000;
 /// Frames between two that are logged, at most.
 const SKIPPED_MAX: u32 = 4096;
 const FIELDS_MAX: usize = 512;
+/// Numbers that are written together, at most. (Encoding 6 has up to eight, all of them fields.)
+const GROUP_MAX: usize = 4;
 const KINDS: &[u8] = b"IPSGHE";
 
 /// How one field is written in one kind of frame.
@@ -134,7 +136,9 @@ impl Plan {
 
     /// Decodes all main frames; `visit` gets the time, us, and the raw numbers of each.
     pub(super) fn walk(&self, data: &[u8], mut visit: impl FnMut(u64, &[u32])) -> Walked {
-        let mut state = State::new(self.names.len());
+        // A group may end behind the last field: there is room for the numbers that belong to none.
+        let fields = self.others.values().map(Vec::len).fold(self.names.len(), usize::max);
+        let mut state = State::new(fields + GROUP_MAX);
         let (mut bytes, mut walked) = (Bytes { data, at: 0 }, Walked::default());
         while bytes.at < data.len() {
             let start = bytes.at;
@@ -271,10 +275,10 @@ impl State {
             self.leap = false;
         }
         std::mem::swap(&mut self.before, &mut self.last);
-        self.last.copy_from_slice(&self.current);
+        std::mem::swap(&mut self.last, &mut self.current);
         if intra {
             // It is all the history that there is.
-            self.before.copy_from_slice(&self.current);
+            self.before.copy_from_slice(&self.last);
         }
         true
     }
@@ -294,6 +298,11 @@ impl Bytes<'_> {
 
     /// Seven bits a byte, the lowest first.
     fn unsigned(&mut self) -> Option<u32> {
+        // Most numbers are differences and have one byte.
+        if let Some(&byte @ 0..128) = self.data.get(self.at) {
+            self.at += 1;
+            return Some(byte.into());
+        }
         let mut value = 0;
         for shift in (0..35).step_by(7) {
             let byte = self.byte()?;
@@ -321,43 +330,36 @@ fn extend(value: u32, bits: u32) -> u32 {
     ((value << shift).cast_signed() >> shift).cast_unsigned()
 }
 
-/// Reads the fields of a frame as they are written.
-fn codings_of(bytes: &mut Bytes, codings: &[Coding], values: &mut Vec<u32>) -> Option<()> {
-    let count = codings.len();
-    if values.len() < count {
-        values.resize(count, 0);
-    }
+/// Reads the fields of a frame as they are written; `values` has room for a group behind the last.
+fn codings_of(bytes: &mut Bytes, codings: &[Coding], values: &mut [u32]) -> Option<()> {
     let mut i = 0;
-    // Groups may end behind the last field, whose numbers are then not written.
-    let mut put = |i: &mut usize, group: &[u32]| {
-        for &value in group {
-            if let Some(place) = values.get_mut(*i).filter(|_| *i < count) {
-                *place = value;
-            }
-            *i += 1;
-        }
-    };
-    while i < count {
-        match codings[i].encoding {
-            0 => put(&mut i, &[bytes.signed()?]),
-            1 => put(&mut i, &[bytes.unsigned()?]),
-            3 => put(&mut i, &[extend(bytes.unsigned()? & 0x3fff, 14).wrapping_neg()]),
+    while i < codings.len() {
+        i += match codings[i].encoding {
+            0 => put(values, i, [bytes.signed()?]),
+            1 => put(values, i, [bytes.unsigned()?]),
+            3 => put(values, i, [extend(bytes.unsigned()? & 0x3fff, 14).wrapping_neg()]),
             6 => {
                 let group = codings[i..].iter().take(8).take_while(|c| c.encoding == 6).count();
                 let flags = if group == 1 { 1 } else { bytes.byte()? };
-                for k in 0..group {
-                    let value = if flags >> k & 1 == 1 { bytes.signed()? } else { 0 };
-                    put(&mut i, &[value]);
+                for (k, value) in values[i..i + group].iter_mut().enumerate() {
+                    *value = if flags >> k & 1 == 1 { bytes.signed()? } else { 0 };
                 }
+                group
             }
-            7 => put(&mut i, &three(bytes, false)?),
-            8 => put(&mut i, &four(bytes)?),
-            9 => put(&mut i, &[0]),
-            10 => put(&mut i, &three(bytes, true)?),
+            7 => put(values, i, three(bytes, false)?),
+            8 => put(values, i, four(bytes)?),
+            9 => put(values, i, [0]),
+            10 => put(values, i, three(bytes, true)?),
             _ => return None,
-        }
+        };
     }
     Some(())
+}
+
+/// Writes a group of numbers from place `i` on; returns how many.
+fn put<const N: usize>(values: &mut [u32], i: usize, group: [u32; N]) -> usize {
+    values[i..i + N].copy_from_slice(&group);
+    N
 }
 
 /// Three numbers, the widest of which chooses the width: 2, 4 or 6 bits each, or whole bytes;

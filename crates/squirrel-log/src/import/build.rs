@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::error::ImportError;
 use super::frames::AttitudeFrame;
 use super::map::{ChannelMap, Conversion, ImportMap, SourceMap};
-use super::report::{AbsentChannel, ChannelReport, Gaps, ImportReport};
+use super::report::{AbsentChannel, ChannelReport, ImportReport, Pace};
 use super::table::Table;
 use crate::{Channel, FlightLog, Source};
 
@@ -61,8 +61,7 @@ pub(super) fn add_source(
             return Err(all_missing(channel, table));
         }
         let axis: Vec<f64> = rows.iter().map(|&row| time_s[row]).collect();
-        let (rate_hz, gaps) = (median_rate_hz(&axis), Gaps::of(&axis));
-        let mean_rate_hz = mean_rate_hz(&axis);
+        let Pace { rate_hz, mean_rate_hz, gaps } = Pace::of(&axis);
         let target = log
             .sources
             .entry(group.to_owned())
@@ -246,17 +245,4 @@ impl Continuous {
         self.last = Some(q);
         Ok(q)
     }
-}
-
-/// Steps of a time axis over its length.
-pub(super) fn mean_rate_hz(time_s: &[f64]) -> Option<f64> {
-    let (first, last) = (time_s.first()?, time_s.last()?);
-    (last > first).then(|| (time_s.len() - 1) as f64 / (last - first))
-}
-
-/// One over the median step of a time axis.
-pub(super) fn median_rate_hz(time_s: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_unstable_by(f64::total_cmp);
-    steps.get(steps.len() / 2).map(|step| 1.0 / step)
 }

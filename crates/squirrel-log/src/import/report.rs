@@ -78,16 +78,39 @@ impl Gaps {
     /// Median steps that are no gap yet: two samples in a row may be lost.
     pub const STEPS: f64 = 3.5;
 
-    pub(super) fn of(time_s: &[f64]) -> Self {
-        let steps = || time_s.windows(2).map(|pair| pair[1] - pair[0]);
-        let mut sorted: Vec<f64> = steps().collect();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let longest = Self::STEPS * sorted.get(sorted.len() / 2).copied().unwrap_or(f64::INFINITY);
-        let gaps = steps().filter(|&step| step > longest);
+    fn of(steps: impl Iterator<Item = f64>, median: f64) -> Self {
+        let gaps = steps.filter(|&step| step > Self::STEPS * median);
         gaps.fold(Self::default(), |gaps, step| Self {
             count: gaps.count + 1,
             longest_s: gaps.longest_s.max(step),
         })
+    }
+}
+
+/// How regularly samples follow each other; see the fields of [`ChannelReport`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pace {
+    pub(super) rate_hz: Option<f64>,
+    pub(super) mean_rate_hz: Option<f64>,
+    pub(super) gaps: Gaps,
+}
+
+impl Pace {
+    pub(super) fn of(time_s: &[f64]) -> Self {
+        let steps = || time_s.windows(2).map(|pair| pair[1] - pair[0]);
+        let mut all: Vec<f64> = steps().collect();
+        let middle = all.len() / 2;
+        let median =
+            (!all.is_empty()).then(|| *all.select_nth_unstable_by(middle, f64::total_cmp).1);
+        let mean_rate_hz = match time_s {
+            [first, .., last] if last > first => Some((time_s.len() - 1) as f64 / (last - first)),
+            _ => None,
+        };
+        Self {
+            rate_hz: median.map(|step| 1.0 / step),
+            mean_rate_hz,
+            gaps: Gaps::of(steps(), median.unwrap_or(f64::INFINITY)),
+        }
     }
 }
 

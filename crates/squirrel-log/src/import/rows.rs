@@ -1,5 +1,7 @@
 //! What the import without a map asks of a log: the numbers of a column by its name.
 
+use std::borrow::Cow;
+
 use super::number::Column;
 
 /// Messages of one topic, or frames of a log.
@@ -8,7 +10,7 @@ pub(super) trait Rows {
     fn len(&self) -> usize;
 
     /// The numbers of a column, one a row; `None` if there is no such column.
-    fn column(&self, name: &str) -> Option<Vec<f64>>;
+    fn column(&self, name: &str) -> Option<Cow<'_, [f64]>>;
 }
 
 /// Records of a binary log, not decoded yet.
@@ -22,8 +24,10 @@ impl Rows for Records<'_> {
         self.records.len()
     }
 
-    fn column(&self, name: &str) -> Option<Vec<f64>> {
+    fn column(&self, name: &str) -> Option<Cow<'_, [f64]>> {
         let column = self.columns.iter().find(|column| column.name == name)?;
-        Some(self.records.iter().map(|record| column.number(record)).collect())
+        let mut numbers = Vec::with_capacity(self.records.len());
+        column.append(&mut numbers, self.records.iter().copied());
+        Some(numbers.into())
     }
 }

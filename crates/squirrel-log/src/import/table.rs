@@ -21,6 +21,9 @@ use super::ulog_file::UlogFile;
 use super::usd_file::UsdFile;
 use crate::files;
 
+/// Records of which all columns are read before the next: few enough for the processor's cache.
+const RECORDS_AT_ONCE: usize = 512;
+
 /// A file, or a topic of one, whose column names are known and whose numbers are not read yet.
 pub(super) trait TableFile {
     /// Names of the columns.
@@ -126,24 +129,28 @@ impl Table {
         columns: &[Column],
         names: &[String],
         wanted: &[&str],
-        records: &(impl ExactSizeIterator<Item = &'r [u8]> + Clone),
+        mut records: impl ExactSizeIterator<Item = &'r [u8]>,
     ) -> Result<Self, ImportError> {
         let places = places(&file, names, wanted)?;
-        let mut values = vec![Vec::with_capacity(records.len()); wanted.len()];
-        for (&place, values) in places.iter().zip(&mut values) {
-            let column = &columns[place];
-            for (row, record) in records.clone().enumerate() {
-                let number = column.number(record);
-                values.push(checked(number).map_err(|problem| ImportError::Cell {
-                    file: file.clone(),
-                    column: column.name.clone(),
-                    row: row as u64 + 1,
-                    value: number.to_string(),
-                    problem,
-                })?);
+        let count = records.len();
+        let mut values: Vec<Vec<f64>> = wanted.iter().map(|_| Vec::with_capacity(count)).collect();
+        for start in (0..count).step_by(RECORDS_AT_ONCE) {
+            let some: Vec<&[u8]> = records.by_ref().take(RECORDS_AT_ONCE).collect();
+            for (&place, values) in places.iter().zip(&mut values) {
+                let column = &columns[place];
+                column.append(values, some.iter().copied());
+                for (row, number) in values.iter_mut().enumerate().skip(start) {
+                    *number = checked(*number).map_err(|problem| ImportError::Cell {
+                        file: file.clone(),
+                        column: column.name.clone(),
+                        row: row as u64 + 1,
+                        value: number.to_string(),
+                        problem,
+                    })?;
+                }
             }
         }
-        let rows = (1..=records.len() as u64).collect();
+        let rows = (1..=count as u64).collect();
         Ok(Self::new(file, wanted, values, rows))
     }
 

@@ -99,7 +99,7 @@ impl TableFile for UlogFile<'_> {
     fn read(self: Box<Self>, wanted: &[&str]) -> Result<Table, ImportError> {
         let records = self.messages.iter().map(|message| &self.bytes[message.clone()]);
         let mut table =
-            Table::of_records(self.name, &self.layout.columns, &self.columns, wanted, &records)?;
+            Table::of_records(self.name, &self.layout.columns, &self.columns, wanted, records)?;
         self.meter.add(self.bytes.len());
         table.bytes_cut = self.bytes_cut as u64;
         Ok(table)

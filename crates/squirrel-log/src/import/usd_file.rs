@@ -68,7 +68,7 @@ impl TableFile for UsdFile<'_> {
 
     fn read(self: Box<Self>, wanted: &[&str]) -> Result<Table, ImportError> {
         let records = self.records.iter().map(|&record| &self.bytes[record..]);
-        let table = Table::of_records(self.name, &self.columns, &self.names, wanted, &records)?;
+        let table = Table::of_records(self.name, &self.columns, &self.names, wanted, records)?;
         self.meter.add(self.bytes.len());
         Ok(table)
     }
@@ -104,8 +104,9 @@ fn records<'h>(
         }
         if event.name == topic {
             records.push(at);
+        } else {
+            topics.insert(event.name.as_str());
         }
-        topics.insert(event.name.as_str());
         at += event.size;
     }
     Ok(records)

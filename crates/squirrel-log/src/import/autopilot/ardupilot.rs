@@ -3,8 +3,10 @@
 //! Body FRD and world NED as here. `RCOU` are pulses in us, `IMU` rad/s and m/s2 (specific force),
 //! `ATT` angles in degrees, `XKF1` position and velocity of the filter relative to its origin.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::rc::Rc;
 
 use super::super::ardupilot_file::BinLog;
 use super::super::rows::Rows;
@@ -129,7 +131,7 @@ fn attitude(log: &Log, collected: &mut Collected, notes: &mut Vec<String>) {
 }
 
 /// Median angle between quaternions and those of other messages, nearest in time, rad.
-fn median_apart(time_us: &[f64], q: &[Vec<f64>], others: &[(f64, [f64; 4])]) -> f64 {
+fn median_apart(time_us: &[f64], q: &[Cow<[f64]>], others: &[(f64, [f64; 4])]) -> f64 {
     let apart = |(i, t): (usize, &f64)| {
         let (_, other) = others.get(nearest(others.len(), *t, |k| others[k].0)?)?;
         let along: f64 = (0..4).map(|k| q[k][i] * other[k]).sum();
@@ -210,7 +212,7 @@ fn commands(log: &Log, channels: &[usize], collected: &mut Collected, notes: &mu
 /// Speeds of the motors, each of which writes its own messages: at the times of the first, of the
 /// others the samples nearest to these.
 fn speeds(log: &Log, channels: &[usize], collected: &mut Collected, notes: &mut Vec<String>) {
-    let all: Vec<(String, Vec<f64>, Vec<f64>)> = channels
+    let all: Vec<(String, Rc<[f64]>, Vec<f64>)> = channels
         .iter()
         .filter_map(|&n| {
             // One message name with instances counted from 0; before 4.0 one name an ESC.
@@ -219,13 +221,13 @@ fn speeds(log: &Log, channels: &[usize], collected: &mut Collected, notes: &mut 
                 _ => (format!("ESC{n}"), 0),
             };
             log.with(&name, u8::try_from(instance).ok()?, |topic| {
-                let rpm = topic.columns(&["RPM"])?.swap_remove(0);
+                let rpm = topic.columns(&["RPM"])?.swap_remove(0).into_owned();
                 let label = if name == "ESC" {
                     format!("ESC[{instance}].RPM")
                 } else {
                     format!("{name}.RPM")
                 };
-                Some((label, topic.time_us().to_vec(), rpm))
+                Some((label, Rc::clone(topic.time_us()), rpm))
             })?
         })
         .collect();
@@ -237,9 +239,9 @@ fn speeds(log: &Log, channels: &[usize], collected: &mut Collected, notes: &mut 
         }
         return;
     }
-    let axis = all[0].1.clone();
+    let axis = Rc::clone(&all[0].1);
     let (mut values, mut apart_us) = (Vec::new(), 0.0_f64);
-    for &t in &axis {
+    for &t in &*axis {
         for (_, time_us, rpm) in &all {
             let sample = nearest(time_us.len(), t, |i| time_us[i]).map(|i| (time_us[i], rpm[i]));
             let (at, rpm) = sample.unwrap_or((t, f64::NAN));

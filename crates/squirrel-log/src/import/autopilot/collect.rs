@@ -1,9 +1,10 @@
 //! What a log without a map gives: channels with their own times, put together to a flight log.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
-use super::super::build::{mean_rate_hz, median_rate_hz};
-use super::super::report::{ChannelReport, Gaps};
+use super::super::report::{ChannelReport, Pace};
 use super::super::rows::Rows;
 use crate::{Channel, FlightLog, Source};
 
@@ -30,7 +31,7 @@ pub(super) struct Topic<'a> {
     /// Rows whose time is after that of all before.
     kept: Vec<usize>,
     /// Of the kept rows.
-    time_us: Vec<f64>,
+    time_us: Rc<[f64]>,
     /// Rows whose time is none, repeats or runs backwards.
     pub(super) dropped: usize,
 }
@@ -56,19 +57,19 @@ impl<'a> Topic<'a> {
             }
         }
         let dropped = rows.len() - kept.len();
-        Some(Self { name: name.to_owned(), rows, kept, time_us, dropped })
+        Some(Self { name: name.to_owned(), rows, kept, time_us: time_us.into(), dropped })
     }
 
     /// The kept numbers of some columns; `None` if one of them is missing.
-    pub(super) fn columns(&self, names: &[&str]) -> Option<Vec<Vec<f64>>> {
-        let own = |name: &&str| {
-            let all = self.rows.column(name)?;
-            Some(self.kept.iter().map(|&row| all[row]).collect())
+    pub(super) fn columns(&self, names: &[&str]) -> Option<Vec<Cow<'_, [f64]>>> {
+        let own = |name: &&str| match self.rows.column(name)? {
+            all if self.dropped == 0 => Some(all),
+            all => Some(self.kept.iter().map(|&row| all[row]).collect()),
         };
         names.iter().map(own).collect()
     }
 
-    pub(super) fn time_us(&self) -> &[f64] {
+    pub(super) fn time_us(&self) -> &Rc<[f64]> {
         &self.time_us
     }
 }
@@ -78,7 +79,8 @@ struct Taken {
     name: &'static str,
     columns: Vec<String>,
     origin: &'static str,
-    time_us: Vec<f64>,
+    /// Channels of one topic share it.
+    time_us: Rc<[f64]>,
     width: usize,
     values: Vec<f64>,
 }
@@ -104,7 +106,8 @@ impl Collected {
         mut sample: impl FnMut(&[f64], &mut Vec<f64>),
     ) -> bool {
         let Some(numbers) = topic.columns(columns) else { return false };
-        let (mut values, mut row) = (Vec::new(), vec![0.0; columns.len()]);
+        let mut values = Vec::with_capacity(topic.time_us.len() * columns.len());
+        let mut row = vec![0.0; columns.len()];
         for i in 0..topic.time_us.len() {
             for (number, column) in row.iter_mut().zip(&numbers) {
                 *number = column[i];
@@ -112,7 +115,7 @@ impl Collected {
             sample(&row, &mut values);
         }
         let columns = columns.iter().map(|column| format!("{}.{column}", topic.name)).collect();
-        self.add_values(name, columns, origin, topic.time_us.clone(), values)
+        self.add_values(name, columns, origin, Rc::clone(&topic.time_us), values)
     }
 
     /// Adds a channel as it is; false if it has no number.
@@ -121,7 +124,7 @@ impl Collected {
         name: &'static str,
         columns: Vec<String>,
         origin: &'static str,
-        time_us: Vec<f64>,
+        time_us: Rc<[f64]>,
         mut values: Vec<f64>,
     ) -> bool {
         for value in values.iter_mut().filter(|value| !value.is_finite()) {
@@ -145,8 +148,9 @@ impl Collected {
     pub(super) fn finish(self) -> (FlightLog, Vec<ChannelReport>, f64) {
         let first = self.all.iter().filter_map(|taken| taken.time_us.first());
         let zero_us = first.copied().fold(f64::INFINITY, f64::min);
-        let mut groups: BTreeMap<&str, Vec<&Taken>> = BTreeMap::new();
-        for taken in &self.all {
+        let reports = reports(&self.all, zero_us);
+        let mut groups: BTreeMap<&str, Vec<Taken>> = BTreeMap::new();
+        for taken in self.all {
             let group = taken.name.rsplit_once('.').map_or("", |(group, _)| group);
             groups.entry(group).or_default().push(taken);
         }
@@ -156,41 +160,49 @@ impl Collected {
             let mut source = Source::default();
             for taken in channels {
                 let name = taken.name.rsplit_once('.').map_or(taken.name, |(_, name)| name);
+                let width = taken.width;
                 let values = spread(taken, &axis);
-                source.channels.insert(name.to_owned(), Channel { width: taken.width, values });
+                source.channels.insert(name.to_owned(), Channel { width, values });
             }
             source.time_s = axis.iter().map(|t| (t - zero_us) / 1e6).collect();
             log.sources.insert(group.to_owned(), source);
         }
-        let reports = self.all.iter().map(|taken| taken.report(zero_us)).collect();
         (log, reports, zero_us)
     }
 }
 
-impl Taken {
-    fn report(&self, zero_us: f64) -> ChannelReport {
-        let rows = self.values.chunks_exact(self.width);
-        let time_s: Vec<f64> = self.time_us.iter().map(|t| (t - zero_us) / 1e6).collect();
+/// The channels as the report has them.
+fn reports(all: &[Taken], zero_us: f64) -> Vec<ChannelReport> {
+    // Channels that share an axis share its pace.
+    let mut paces: BTreeMap<*const f64, Pace> = BTreeMap::new();
+    let report = |taken: &Taken| {
+        let pace = paces.entry(taken.time_us.as_ptr()).or_insert_with(|| {
+            let seconds = taken.time_us.iter().map(|t| (t - zero_us) / 1e6);
+            Pace::of(&seconds.collect::<Vec<_>>())
+        });
+        let &mut Pace { rate_hz, mean_rate_hz, gaps } = pace;
+        let rows = taken.values.chunks_exact(taken.width);
         ChannelReport {
-            channel: self.name.to_owned(),
-            columns: self.columns.clone(),
-            origin: Some(self.origin.to_owned()),
-            samples: time_s.len(),
-            rate_hz: median_rate_hz(&time_s),
-            mean_rate_hz: mean_rate_hz(&time_s),
-            gaps: Gaps::of(&time_s),
+            channel: taken.name.to_owned(),
+            columns: taken.columns.clone(),
+            origin: Some(taken.origin.to_owned()),
+            samples: taken.time_us.len(),
+            rate_hz,
+            mean_rate_hz,
+            gaps,
             samples_missing: rows.filter(|row| row.iter().any(|x| x.is_nan())).count(),
             repeats_dropped: 0,
         }
-    }
+    };
+    all.iter().map(report).collect()
 }
 
 /// All times of the channels, in order, each once.
-fn union(channels: &[&Taken]) -> Vec<f64> {
+fn union(channels: &[Taken]) -> Vec<f64> {
     let mut axis: Vec<f64> = Vec::new();
     for taken in channels {
-        if axis != taken.time_us {
-            axis.extend(&taken.time_us);
+        if *axis != *taken.time_us {
+            axis.extend(&*taken.time_us);
             axis.sort_unstable_by(f64::total_cmp);
             axis.dedup();
         }
@@ -199,9 +211,9 @@ fn union(channels: &[&Taken]) -> Vec<f64> {
 }
 
 /// The samples of a channel at all times of an axis that has its own.
-fn spread(taken: &Taken, axis: &[f64]) -> Vec<f64> {
+fn spread(taken: Taken, axis: &[f64]) -> Vec<f64> {
     if axis.len() == taken.time_us.len() {
-        return taken.values.clone();
+        return taken.values;
     }
     let mut values = vec![f64::NAN; axis.len() * taken.width];
     let mut at = 0;
