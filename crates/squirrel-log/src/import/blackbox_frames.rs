@@ -298,11 +298,6 @@ impl Bytes<'_> {
 
     /// Seven bits a byte, the lowest first.
     fn unsigned(&mut self) -> Option<u32> {
-        // Most numbers are differences and have one byte.
-        if let Some(&byte @ 0..128) = self.data.get(self.at) {
-            self.at += 1;
-            return Some(byte.into());
-        }
         let mut value = 0;
         for shift in (0..35).step_by(7) {
             let byte = self.byte()?;

@@ -13,38 +13,11 @@ pub(super) struct Column {
 impl Column {
     /// The number in a record; NaN if the record is too short for it.
     pub(super) fn number(&self, record: &[u8]) -> f64 {
-        self.number_as(self.kind, record)
-    }
-
-    /// Appends the numbers in some records, each as [`Column::number`] gives it.
-    pub(super) fn append<'r>(&self, to: &mut Vec<f64>, records: impl Iterator<Item = &'r [u8]>) {
-        // The type is asked before the records, of which there are millions.
-        match self.kind {
-            Kind::I8 => self.append_as(Kind::I8, to, records),
-            Kind::U8 => self.append_as(Kind::U8, to, records),
-            Kind::I16 => self.append_as(Kind::I16, to, records),
-            Kind::U16 => self.append_as(Kind::U16, to, records),
-            Kind::F32 => self.append_as(Kind::F32, to, records),
-            Kind::F64 => self.append_as(Kind::F64, to, records),
-            rare => self.append_as(rare, to, records),
-        }
-    }
-
-    #[inline(always)]
-    fn append_as<'r>(
-        &self,
-        kind: Kind,
-        to: &mut Vec<f64>,
-        records: impl Iterator<Item = &'r [u8]>,
-    ) {
-        to.extend(records.map(|record| self.number_as(kind, record)));
-    }
-
-    #[inline(always)]
-    fn number_as(&self, kind: Kind, record: &[u8]) -> f64 {
-        let stored = kind.number(record.get(self.offset..).unwrap_or_default());
-        // Hundredths are divided: 0.01 is no binary number, 100 is, so this rounds once.
-        if self.scale < 1.0 { stored / self.scale.recip() } else { stored * self.scale }
+        record.get(self.offset..).map_or(f64::NAN, |bytes| {
+            let stored = self.kind.number(bytes);
+            // Hundredths are divided: 0.01 is no binary number, 100 is, so this rounds once.
+            if self.scale < 1.0 { stored / self.scale.recip() } else { stored * self.scale }
+        })
     }
 }
 
@@ -76,7 +49,6 @@ impl Kind {
     }
 
     /// The number at the start of `bytes`; NaN if there are too few.
-    #[inline(always)]
     pub(super) fn number(self, bytes: &[u8]) -> f64 {
         match self {
             Kind::I8 => bytes.first_chunk().map(|&b| f64::from(i8::from_le_bytes(b))),

@@ -26,8 +26,6 @@ impl Rows for Records<'_> {
 
     fn column(&self, name: &str) -> Option<Cow<'_, [f64]>> {
         let column = self.columns.iter().find(|column| column.name == name)?;
-        let mut numbers = Vec::with_capacity(self.records.len());
-        column.append(&mut numbers, self.records.iter().copied());
-        Some(numbers.into())
+        Some(self.records.iter().map(|record| column.number(record)).collect())
     }
 }

@@ -138,15 +138,15 @@ impl Table {
             let some: Vec<&[u8]> = records.by_ref().take(RECORDS_AT_ONCE).collect();
             for (&place, values) in places.iter().zip(&mut values) {
                 let column = &columns[place];
-                column.append(values, some.iter().copied());
-                for (row, number) in values.iter_mut().enumerate().skip(start) {
-                    *number = checked(*number).map_err(|problem| ImportError::Cell {
+                for (row, record) in (start..).zip(&some) {
+                    let number = column.number(record);
+                    values.push(checked(number).map_err(|problem| ImportError::Cell {
                         file: file.clone(),
                         column: column.name.clone(),
                         row: row as u64 + 1,
                         value: number.to_string(),
                         problem,
-                    })?;
+                    })?);
                 }
             }
         }

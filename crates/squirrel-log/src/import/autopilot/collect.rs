@@ -173,7 +173,7 @@ impl Collected {
 
 /// The channels as the report has them.
 fn reports(all: &[Taken], zero_us: f64) -> Vec<ChannelReport> {
-    // Channels that share an axis share its pace.
+    // Channels that share an axis share its pace; axes are told apart by where they stand.
     let mut paces: BTreeMap<*const f64, Pace> = BTreeMap::new();
     let report = |taken: &Taken| {
         let pace = paces.entry(taken.time_us.as_ptr()).or_insert_with(|| {
