@@ -5,6 +5,7 @@ use super::point::Member;
 use super::ranked::ratio;
 use super::refine::Scored;
 use super::search::{LEAST, Search};
+use super::standing::CLEAR_BESIDE;
 use super::{CLEAR, Naming};
 use squirrel_core::effects::Response;
 
@@ -83,7 +84,8 @@ impl Search<'_> {
     pub(crate) fn least_clear(&self, naming: &Naming) -> Option<usize> {
         let best = &naming.found.best;
         let clear = |i: &usize| self.stands_out(best, *i, &naming.deviations);
-        let unclear = (0..best.members.len()).filter(|i| clear(i) < CLEAR);
+        let least = if best.members.len() > 1 { CLEAR_BESIDE } else { CLEAR };
+        let unclear = (0..best.members.len()).filter(|i| clear(i) < least);
         unclear.min_by(|a, b| clear(a).total_cmp(&clear(b)))
     }
 

@@ -1,13 +1,14 @@
 //! The search for the set of effects with the most evidence: forward, drop, swap, each step refined
 //! through the simulator.
 
-use super::BEHIND_NATS;
 use super::evidence::BETA;
+use super::interval::deviations;
 use super::linear::Linear;
 use super::off::TOLERANCES_MIN;
 use super::parameters::Catalogue;
 use super::point::{Member, Point, hypothesis};
 use super::refine::Scored;
+use super::{BEHIND_NATS, STANDS};
 use crate::GapError;
 use crate::predictor::{Hypothesis, Predictor};
 use squirrel_core::effects::{Effect, Mimic, Profile, Response, WeakRotor};
@@ -15,7 +16,8 @@ use std::rc::Rc;
 
 /// What an effect must be worth to be named, nats.
 pub(crate) const NATS_MIN: f64 = 6.0;
-/// What each further effect must be worth: a wrong first number leaves a little to explain.
+/// What each further effect must be worth, unless its number stands out by [`STANDS`]: a wrong
+/// first number leaves a little to explain.
 pub(super) const FURTHER_NATS: f64 = 10.0;
 /// What an effect must be worth beside gusts, which blow harder at times than at others; and per
 /// squared m/s of their deviation, if it acts through moving air, as gusts on average do.
@@ -270,11 +272,8 @@ impl Search<'_> {
             let Some(next) = self.best_addition(linear, best, &[], f64::NEG_INFINITY)? else {
                 break;
             };
-            let least = if best.members.is_empty() { NATS_MIN } else { FURTHER_NATS };
             let is_worth_it = if next.members.len() > best.members.len() {
-                let needed =
-                    next.members.last().map_or(least, |member| self.needed(member).max(least));
-                next.log_evidence >= best.log_evidence + needed
+                self.is_worth_its_name(linear, best, &next)
             } else {
                 self.weighed(&next) >= self.weighed(best) + BEHIND_NATS
             };
@@ -287,6 +286,18 @@ impl Search<'_> {
             self.choose_forms(linear, best)?;
         }
         Ok(())
+    }
+
+    /// Whether the last member of a set is worth a name beside the others.
+    ///
+    /// * `before` - the set without it
+    fn is_worth_its_name(&self, linear: &Linear, before: &Scored, set: &Scored) -> bool {
+        let Some(last) = set.members.len().checked_sub(1) else { return false };
+        let nats = set.log_evidence - before.log_evidence;
+        nats >= self.needed(&set.members[last])
+            && (before.members.is_empty()
+                || nats >= FURTHER_NATS
+                || self.stands_out(set, last, &deviations(self, linear, set)) >= STANDS)
     }
 
     /// The best set with one more effect, in the place of what it leaves too little of.

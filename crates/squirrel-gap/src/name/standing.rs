@@ -24,6 +24,8 @@ pub(crate) struct Held {
 pub(crate) const STANDS: f64 = 5.0;
 /// The same where nothing is left: with less the flights do not tell a number from what the file has.
 pub(crate) const CLEAR: f64 = 3.0;
+/// The same beside other names, whose numbers leave a little to explain where they are wrong.
+pub(super) const CLEAR_BESIDE: f64 = 4.0;
 
 /// Part of what is above noise that names explain which leave something in forces alone, or in
 /// moments.
