@@ -59,8 +59,8 @@ const START_WEIGHTS: [f64; 9] = [-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0
 const START_SUM: f64 = 231.0;
 const START_NOISE: f64 = 0.505;
 
-/// Longest step of the plant, s.
-const STEP_MAX_S: f64 = 0.0012;
+/// Longest step of the plant, s: commands are its means, and what they move is slower.
+const STEP_MAX_S: f64 = 0.0036;
 
 pub(crate) type Errors = SVector<f64, 12>;
 
@@ -422,9 +422,8 @@ impl<'a> Segments<'a> {
                 rate += before.omega.vector;
                 state.battery.voltage_v = track.voltage_v[sample];
                 for step in 0..substeps(track.period_s) {
-                    // The command that acts in the middle of the step.
-                    clock.advance_to(track.time_s[sample] + (step as f64 + 0.5) * plant.dt_s());
-                    let (rotor, wing) = clock.now();
+                    let from_s = track.time_s[sample] + step as f64 * plant.dt_s();
+                    let (rotor, wing) = clock.mean(from_s, from_s + plant.dt_s());
                     plant.step(&mut state, &rotor, wing, In::new(wind));
                 }
                 let slope = (state.body.velocity.vector - before.velocity.vector) / track.period_s;
@@ -490,7 +489,7 @@ impl<'a> Segments<'a> {
     }
 }
 
-/// Steps of the plant to a sample: commands may change between samples.
+/// Steps of the plant to a sample.
 fn substeps(period_s: f64) -> usize {
     (period_s / STEP_MAX_S).ceil().max(1.0) as usize
 }

@@ -1,6 +1,7 @@
 //! The search for the set of effects with the most evidence: forward, drop, swap, each step refined
 //! through the simulator.
 
+use super::BEHIND_NATS;
 use super::evidence::BETA;
 use super::interval::deviations;
 use super::linear::Linear;
@@ -8,7 +9,6 @@ use super::off::TOLERANCES_MIN;
 use super::parameters::Catalogue;
 use super::point::{Member, Point, hypothesis};
 use super::refine::Scored;
-use super::{BEHIND_NATS, STANDS};
 use crate::GapError;
 use crate::predictor::{Hypothesis, Predictor};
 use squirrel_core::effects::{Effect, Mimic, Profile, Response, WeakRotor};
@@ -16,9 +16,11 @@ use std::rc::Rc;
 
 /// What an effect must be worth to be named, nats.
 pub(crate) const NATS_MIN: f64 = 6.0;
-/// What each further effect must be worth, unless its number stands out by [`STANDS`]: a wrong
-/// first number leaves a little to explain.
+/// What each further effect must be worth, as a wrong first number leaves a little to explain; and
+/// the deviations by which a number stands out of which that is not said: the flights alone would be
+/// worth far more, and all that speaks against it is what the vehicle file allows.
 pub(super) const FURTHER_NATS: f64 = 10.0;
+const SHARP: f64 = 8.0;
 /// What an effect must be worth beside gusts, which blow harder at times than at others; and per
 /// squared m/s of their deviation, if it acts through moving air, as gusts on average do.
 const BESIDE_GUSTS_NATS: f64 = 12.0;
@@ -297,7 +299,7 @@ impl Search<'_> {
         nats >= self.needed(&set.members[last])
             && (before.members.is_empty()
                 || nats >= FURTHER_NATS
-                || self.stands_out(set, last, &deviations(self, linear, set)) >= STANDS)
+                || self.stands_out(set, last, &deviations(self, linear, set)) >= SHARP)
     }
 
     /// The best set with one more effect, in the place of what it leaves too little of.

@@ -124,9 +124,50 @@ impl Clock<'_> {
         let next = self.commands.wing.get(self.wing + 1);
         next.map_or(f64::INFINITY, |(stamp, _)| self.acts_s(*stamp))
     }
+    /// Means of the commands that act from one time to another, as [`Self::now`] has them; runs to
+    /// the second time.
+    pub(crate) fn mean(&mut self, from_s: f64, until_s: f64) -> (PerRotor<f64>, [f64; 2]) {
+        self.advance_to(from_s);
+        let (mut at_s, mut means) = (from_s, ([0.0; MAX_ROTORS], [0.0; 2]));
+        while at_s < until_s {
+            let next_s = self.next_rotor_s().min(self.next_wing_s()).min(until_s);
+            let share = (next_s - at_s) / (until_s - from_s);
+            let (rotor, wing) = self.now();
+            let own = means.0.iter_mut().zip(rotor).chain(means.1.iter_mut().zip(wing));
+            own.for_each(|(mean, command)| *mean += command * share);
+            at_s = next_s;
+            self.advance_to(at_s);
+        }
+        means
+    }
     /// Rotor command in the vehicle's unit, and wing command, left and right, 0 to 1.
     pub(crate) fn now(&self) -> (PerRotor<f64>, [f64; 2]) {
         let wing = self.commands.wing.get(self.wing).map_or([0.0; 2], |(_, wing)| *wing);
         (self.commands.rotor[self.rotor].1, wing)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_weighs_commands_by_how_long_they_act() {
+        let commands = Commands {
+            rotor: [(0.0, 0.2), (1.0, 0.6), (2.0, 1.0)].map(|(t, u)| (t, [u; MAX_ROTORS])).to_vec(),
+            wing: vec![(0.0, [0.0; 2]), (1.5, [1.0, 0.0])],
+            began_s: 0.0,
+            rotor_speeds: false,
+            period_s: 1.0,
+        };
+        let mut clock = commands.clock(&Effects::none(), 0.0);
+        let near = |(rotor, wing): (PerRotor<f64>, [f64; 2]), u: f64, left: f64| {
+            assert!(rotor.iter().all(|own| (own - u).abs() < 1e-12), "{rotor:?}");
+            assert!((wing[0] - left).abs() < 1e-12 && wing[1] == 0.0, "{wing:?}");
+        };
+        near(clock.mean(0.0, 0.5), 0.2, 0.0);
+        near(clock.mean(0.5, 2.5), (0.5 * 0.2 + 0.6 + 0.5) / 2.0, 0.5);
+        // The last commands are held.
+        near(clock.mean(2.5, 9.0), 1.0, 1.0);
     }
 }
