@@ -59,8 +59,9 @@ const START_WEIGHTS: [f64; 9] = [-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0
 const START_SUM: f64 = 231.0;
 const START_NOISE: f64 = 0.505;
 
-/// Longest step of the plant, s: commands are its means, and what they move is slower.
-const STEP_MAX_S: f64 = 0.0036;
+/// Shortest and longest step of the plant, s: commands are its means, and it is no longer than the
+/// lag of the rotors that they move.
+const STEP_S: (f64, f64) = (0.0001, 0.0036);
 
 pub(crate) type Errors = SVector<f64, 12>;
 
@@ -316,6 +317,8 @@ struct Segments<'a> {
     piece: usize,
     motion: Rc<Motion>,
     plant: Plant,
+    /// Of it to a sample.
+    steps: usize,
     /// Samples at which they start, and the plant there.
     starts: Vec<(usize, PlantState)>,
     per_bin: usize,
@@ -330,7 +333,8 @@ impl<'a> Segments<'a> {
         let track = &predictor.tracks[piece];
         let n = track.time_s.len();
         let motion = predictor.motion(piece, hypothesis);
-        let dt_s = track.period_s / substeps(track.period_s) as f64;
+        let steps = substeps(track.period_s, hypothesis);
+        let dt_s = track.period_s / steps as f64;
         let plant = predictor.plant_in(hypothesis, track.flight, dt_s)?;
         let per_bin = (BIN_S / track.period_s).round().max(1.0) as usize;
         let stride = (RESTART_S / track.period_s).round().max(1.0) as usize;
@@ -338,7 +342,7 @@ impl<'a> Segments<'a> {
             (0..n).step_by(stride).skip(1).filter(|s| s + per_bin < n).collect();
         let states = predictor.led_states(&plant, piece, &motion, &starts);
         let starts = starts.into_iter().zip(states).collect();
-        Ok(Self { predictor, hypothesis, piece, motion, plant, starts, per_bin })
+        Ok(Self { predictor, hypothesis, piece, motion, plant, steps, starts, per_bin })
     }
 
     fn track(&self) -> &'a Track {
@@ -421,7 +425,7 @@ impl<'a> Segments<'a> {
                 velocity += before.velocity.vector;
                 rate += before.omega.vector;
                 state.battery.voltage_v = track.voltage_v[sample];
-                for step in 0..substeps(track.period_s) {
+                for step in 0..self.steps {
                     let from_s = track.time_s[sample] + step as f64 * plant.dt_s();
                     let (rotor, wing) = clock.mean(from_s, from_s + plant.dt_s());
                     plant.step(&mut state, &rotor, wing, In::new(wind));
@@ -490,8 +494,14 @@ impl<'a> Segments<'a> {
 }
 
 /// Steps of the plant to a sample.
-fn substeps(period_s: f64) -> usize {
-    (period_s / STEP_MAX_S).ceil().max(1.0) as usize
+fn substeps(period_s: f64, hypothesis: &Hypothesis) -> usize {
+    let propulsion = &hypothesis.vehicle.parameters().propulsion;
+    let [up_s, down_s] = hypothesis.effects.rotor_extra_time_constant_s();
+    let lags_s = [propulsion.time_constant_up_s + up_s, propulsion.time_constant_down_s + down_s];
+    // Rotors without a lag follow at once, in steps of any length.
+    let lag_s = lags_s.into_iter().filter(|lag_s| *lag_s > 0.0).fold(f64::INFINITY, f64::min);
+    let (least_s, most_s) = STEP_S;
+    (period_s / lag_s.clamp(least_s, most_s)).ceil().max(1.0) as usize
 }
 
 #[cfg(test)]
