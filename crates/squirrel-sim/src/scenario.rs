@@ -19,7 +19,7 @@ pub use wind::WindTable;
 use crate::plant::WindParameters;
 use serde::{Deserialize, Serialize};
 use squirrel_core::frames::In;
-use squirrel_core::guidance::mission::{Mission, Steering};
+use squirrel_core::guidance::mission::{Mission, Steering, TurnSide};
 use squirrel_core::guidance::sensing::Sensing;
 use squirrel_core::guidance::trajectory::Trajectory;
 use squirrel_core::nalgebra::Vector3;
@@ -106,8 +106,11 @@ pub enum MissionTable {
         steering_min_rad: f64,
         /// Largest steering angle.
         steering_max_rad: f64,
-        /// Steer to either side.
+        /// Steer to either side, drawn at each encounter.
         both_sides: bool,
+        /// Steer away from the obstacle's axis; not beside `both_sides`.
+        #[serde(default)]
+        turns_away: bool,
     },
     /// Circle about the start.
     Circle {
@@ -238,6 +241,7 @@ impl Scenario {
             steering_min_rad: min_deg.to_radians(),
             steering_max_rad: max_deg.to_radians(),
             both_sides: false,
+            turns_away: false,
         };
         Self {
             measured_window_s: 6.0,
@@ -318,6 +322,9 @@ impl Scenario {
         match &self.mission {
             MissionTable::Excite(table) => table.check().map_err(|e| format!("mission.{e}"))?,
             MissionTable::Runs(table) => table.check().map_err(|e| format!("mission.{e}"))?,
+            MissionTable::Avoid { both_sides: true, turns_away: true, .. } => {
+                return Err("mission.turns_away = true: beside both_sides = true; the side is drawn, or away from the obstacle".to_owned());
+            }
             _ => {}
         }
         let mission = self.mission().map_err(|e| format!("mission.{e}"))?;
@@ -361,6 +368,7 @@ impl Scenario {
                 steering_min_rad,
                 steering_max_rad,
                 both_sides,
+                turns_away,
             } => Mission::Avoid {
                 run: Trajectory::new(start, course_rad as f32, speed_m_s as f32, ramp_s as f32),
                 sensing: Sensing {
@@ -372,7 +380,11 @@ impl Scenario {
                     min_rad: steering_min_rad as f32,
                     max_rad: steering_max_rad as f32,
                     ramp_s: turn_ramp_s as f32,
-                    both_sides,
+                    side: match (turns_away, both_sides) {
+                        (true, _) => TurnSide::Away,
+                        (false, true) => TurnSide::Drawn,
+                        (false, false) => TurnSide::Angle,
+                    },
                     seed: (self.seed ^ (self.seed >> 32)) as u32,
                 },
             },
@@ -429,6 +441,10 @@ mod tests {
             error("duration_s = 13.0", "duration_s = nan").starts_with("s.toml: duration_s = NaN")
         );
         assert!(error("range_m", "rnage_m").contains("s.toml, line"));
+        assert!(
+            error("both_sides = false\nturns_away = false", "both_sides = true\nturns_away = true")
+                .starts_with("s.toml: mission.turns_away = true: beside both_sides = true"),
+        );
         assert!(Scenario::find("loop").unwrap_err().contains("avoid"));
         assert!(Scenario::find("missing.toml").unwrap_err().starts_with("missing.toml"));
     }

@@ -8,8 +8,10 @@
 //! for `twcc_plus`. What the others have over `phantom`, which believes in the flat plate, they owe
 //! to wings and to what they believe, together.
 //!
-//! All of it is flown twice: with the laws as they are, and with the limit of speed that ours has
-//! for the paper's too.
+//! All of it is flown three times: with the laws as they are; with the limit of speed that ours has
+//! for the paper's too; and with that limit, turning away from each trunk's axis. The paper does not
+//! say to which side its drones turn, and a side that is drawn leads into the trunk in every other
+//! encounter: there the turn has to end in front of it.
 
 mod page;
 mod table;
@@ -24,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use squirrel_plan::pilot;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
-use squirrel_sim::scenario::Scenario;
+use squirrel_sim::scenario::{MissionTable, Scenario};
 
 /// Height that may be lost or gained, m.
 pub const BAND_M: f64 = 3.0;
@@ -111,6 +113,8 @@ pub struct Forest {
     /// By arm, with the scenario's limit of speed for the paper's laws too, which have none: what
     /// of the difference is that limit.
     pub limited: Vec<Row>,
+    /// By arm, with that limit, turning away from the trunk instead of to a side that is drawn.
+    pub away: Vec<Row>,
 }
 
 /// Flies the study on all cores; the result depends neither on threads nor on how often it was
@@ -133,7 +137,12 @@ pub fn run(
     let journal = Journal::open(keep, "forest", &plan.identity("forest", [&first]))?;
     let limited = with_limit(plan, &first);
     let fly = |arm, condition, trial| {
-        fly(if condition == 0 { plan } else { &limited }, arm, thrust_to_weight, trial)
+        let plan = if condition == AS_IT_IS { plan } else { &limited };
+        let mut scenario = scenario(plan, thrust_to_weight, trial)?;
+        if condition == AWAY {
+            turn_away(&mut scenario);
+        }
+        fly(plan, arm, scenario)
     };
     let Some(flown) = campaign::run(plan, CONDITIONS, &journal, fly)? else { return Ok(None) };
     let rows = |condition| plan.arms.iter().map(|arm| row(&flown, *arm, condition)).collect();
@@ -142,13 +151,19 @@ pub fn run(
         trials: plan.trials,
         seed: plan.seed,
         thrust_to_weight,
-        rows: rows(0),
-        limited: rows(1),
+        rows: rows(AS_IT_IS),
+        limited: rows(LIMITED),
+        away: rows(AWAY),
     }))
 }
 
-/// As the laws are, and with the limit of speed for all.
-const CONDITIONS: usize = 2;
+const CONDITIONS: usize = 3;
+/// As the laws are.
+const AS_IT_IS: usize = 0;
+/// With the limit of speed for all.
+const LIMITED: usize = 1;
+/// With that limit, turning away from the trunk.
+const AWAY: usize = 2;
 
 /// The plan with the scenario's limit of speed in the primary controller too.
 fn with_limit(plan: &Plan, scenario: &Scenario) -> Plan {
@@ -170,8 +185,13 @@ pub fn scenario(plan: &Plan, thrust_to_weight: f64, trial: u32) -> Result<Scenar
     Ok(plan.outside(scenario))
 }
 
-fn fly(plan: &Plan, arm: Arm, thrust_to_weight: f64, trial: u32) -> Result<Flight, FlightError> {
-    let scenario = scenario(plan, thrust_to_weight, trial)?;
+fn turn_away(scenario: &mut Scenario) {
+    if let MissionTable::Avoid { both_sides, turns_away, .. } = &mut scenario.mission {
+        (*both_sides, *turns_away) = (false, true);
+    }
+}
+
+fn fly(plan: &Plan, arm: Arm, scenario: Scenario) -> Result<Flight, FlightError> {
     let way_m = scenario.forest.as_ref().map_or(f64::INFINITY, |forest| forest.path_m);
     let m = pilot::fly(&plan.setup(arm, scenario), false, |_| {})?.metrics;
     Ok(Flight {

@@ -57,10 +57,21 @@ pub struct Steering {
     pub max_rad: f32,
     /// Time to reach the target speed after the turn, s.
     pub ramp_s: f32,
-    /// Turn to either side, drawn from the seed too.
-    pub both_sides: bool,
+    /// To which side.
+    pub side: TurnSide,
     /// Seed of the draw.
     pub seed: u32,
+}
+
+/// To which side a mission turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TurnSide {
+    /// The angle's own.
+    Angle,
+    /// Either, drawn from the seed too, wherever the obstacle is.
+    Drawn,
+    /// Away from the obstacle's axis; drawn where it is straight ahead.
+    Away,
 }
 
 /// Most obstacles that are remembered as being avoided; of more, the first is forgotten.
@@ -148,7 +159,9 @@ impl Mission {
         let Some(seen) = sensing.nearest(position, velocity, obstacles, known) else { return };
         let course = libm::atan2f(velocity.vector.y, velocity.vector.x);
         let start = In::new(Vector3::new(position.vector.x, position.vector.y, run.start.vector.z));
-        let course_rad = wrap_angle(course + steering.angle(state.encounters));
+        let ahead = offset(position, &seen);
+        let right_m2_s = velocity.vector.x * ahead.y - velocity.vector.y * ahead.x;
+        let course_rad = wrap_angle(course + steering.angle(state.encounters, right_m2_s));
         let turned = Trajectory::new(start, course_rad, run.speed_m_s, steering.ramp_s);
         state.turned = Some((turned, time_us));
         let free = state.handled.iter().position(Option::is_none).unwrap_or(0);
@@ -229,11 +242,19 @@ impl Mission {
 
 impl Steering {
     /// The turn at encounter `n`, rad.
-    fn angle(&self, n: u32) -> f32 {
+    ///
+    /// * `right` - positive where the obstacle is to the right of the course
+    fn angle(&self, n: u32, right: f32) -> f32 {
         let bits = scramble(self.seed.wrapping_add((n.wrapping_add(1)).wrapping_mul(0x9E37_79B9)));
         let share = (bits >> 8) as f32 / (1u32 << 24) as f32;
         let angle = self.min_rad + (self.max_rad - self.min_rad) * share;
-        if self.both_sides && bits & 1 == 1 { -angle } else { angle }
+        let drawn = if bits & 1 == 1 { -angle } else { angle };
+        match self.side {
+            TurnSide::Angle => angle,
+            TurnSide::Away if right > 0.0 => -angle.abs(),
+            TurnSide::Away if right < 0.0 => angle.abs(),
+            TurnSide::Drawn | TurnSide::Away => drawn,
+        }
     }
 }
 
@@ -259,7 +280,7 @@ mod tests {
                 min_rad: 1.92,
                 max_rad: 2.27,
                 ramp_s: 2.0,
-                both_sides: false,
+                side: TurnSide::Angle,
                 seed: 3,
             },
         }
@@ -299,6 +320,27 @@ mod tests {
         assert_eq!(state.encounters, 2);
     }
 
+    /// Flying east, a trunk to the left is to the north.
+    #[test]
+    fn who_turns_away_turns_to_the_side_without_the_obstacle() {
+        let Mission::Avoid { run, sensing, steering } = avoid() else { unreachable!() };
+        let steering = Steering { side: TurnSide::Away, ..steering };
+        let mission = Mission::Avoid { run, sensing, steering };
+        let velocity = In::new(Vector3::new(0.0, 7.0, 0.0));
+        for (north_m, side) in [(0.5, 1.0), (-0.5, -1.0)] {
+            let mut state = MissionState::default();
+            let trunk = [Obstacle { id: 1, north_m, east_m: 4.5 }];
+            mission.sense(&mut state, 0, In::zero(), velocity, &trunk);
+            let turned =
+                wrap_angle(state.turned.unwrap().0.course_rad() - core::f32::consts::FRAC_PI_2);
+            assert!((1.92..=2.27).contains(&(side * turned)), "{north_m}: {turned}");
+        }
+        let mut state = MissionState::default();
+        let ahead = [Obstacle { id: 1, north_m: 0.0, east_m: 4.5 }];
+        mission.sense(&mut state, 0, In::zero(), velocity, &ahead);
+        assert!(state.turned.is_some(), "straight ahead, a side is drawn");
+    }
+
     #[test]
     fn numbers_that_are_none_are_refused_by_name() {
         let Mission::Avoid { run, sensing, steering } = avoid() else { unreachable!() };
@@ -315,8 +357,8 @@ mod tests {
     #[test]
     fn steering_angles_fill_their_range_and_both_sides() {
         let steering =
-            Steering { min_rad: 1.0, max_rad: 2.0, ramp_s: 2.0, both_sides: true, seed: 1 };
-        let angles: Vec<f32> = (0..1000).map(|n| steering.angle(n)).collect();
+            Steering { min_rad: 1.0, max_rad: 2.0, ramp_s: 2.0, side: TurnSide::Drawn, seed: 1 };
+        let angles: Vec<f32> = (0..1000).map(|n| steering.angle(n, 1.0)).collect();
         assert!(angles.iter().all(|a| (1.0..=2.0).contains(&a.abs())));
         let right = angles.iter().filter(|a| **a > 0.0).count();
         let far = angles.iter().filter(|a| a.abs() > 1.5).count();

@@ -229,4 +229,9 @@ fn numbers(page: &mut Page, study: &Forest) {
         "The same flights, with the limit of speed that ours has for the paper's laws too: what of the difference is that limit.",
     );
     page.table(&head(&names), &study.limited.iter().map(cells).collect::<Vec<_>>());
+    page.section(
+        "Turning away from the trunk",
+        "The same flights with that limit, each turn to the side without the trunk instead of to one that was drawn.",
+    );
+    page.table(&head(&names), &study.away.iter().map(cells).collect::<Vec<_>>());
 }

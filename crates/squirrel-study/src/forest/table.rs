@@ -40,10 +40,13 @@ fn fly(plan: &Plan, options: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, F
     found.say(
         "Over phantom: in band, less that of the controller without wings on the same trials, in points.\n",
     );
-    let mut csv = found.sheet(sheet(&study.rows, "as it is"));
+    let mut csv = found.sheet(sheet(&study.rows, "as it is", "drawn"));
     found.say("\nThe same, with the limit of speed that ours has for the paper's laws too.\n");
-    let limited = found.sheet(sheet(&study.limited, "limited"));
+    let limited = found.sheet(sheet(&study.limited, "limited", "drawn"));
     csv.extend(limited.split_inclusive('\n').skip(1));
+    found.say("\nThe same with that limit, turning away from the trunk instead of to a side that was drawn.\n");
+    let away = found.sheet(sheet(&study.away, "limited", "away"));
+    csv.extend(away.split_inclusive('\n').skip(1));
     found.csv = csv;
     found.words(words(&study));
     if keep.folder.is_some() {
@@ -52,12 +55,13 @@ fn fly(plan: &Plan, options: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, F
     Ok(Some(found))
 }
 
-fn sheet(rows: &[Row], speed: &str) -> Sheet {
+fn sheet(rows: &[Row], speed: &str, side: &str) -> Sheet {
     let mut sheet = Sheet::default();
     for row in rows {
         sheet.row(&[
             ("arm", "arm", Cell::Text(row.arm)),
             ("speed", "speed", Cell::Text(speed)),
+            ("side", "side", Cell::Text(side)),
             ("through", "through", Cell::Number(f64::from(row.through.count), 0)),
             ("95 %", "through_low,through_high", Cell::PercentInterval(Some(row.through.share), 0)),
             ("in band", "in_band", Cell::Number(f64::from(row.in_band.count), 0)),

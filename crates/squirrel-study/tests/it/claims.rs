@@ -168,6 +168,19 @@ fn the_better_controller_comes_through_the_forest() {
     }
 }
 
+/// At T/W 1.3, of the record: a turn into the trunk has to end in front of it.
+#[test]
+fn the_side_of_the_turn_decides_where_thrust_is_scarce() {
+    let of = |list: &str, arm: &str, what: &str| {
+        number("forest_scarce", &format!("{list}[arm={arm}]/{what}"))
+    };
+    let share = "in_band/share";
+    let [drawn, away] = ["limited", "away"];
+    assert!(of(drawn, "twcc_plus", &format!("{share}/high")) < 0.5);
+    assert!(of(away, "twcc_plus", &format!("{share}/low")) > 0.85);
+    assert!(of(away, "twcc_plus", "over_pc_plus/low") > 0.1, "wings are worth it there, too");
+}
+
 /// Counts and ways of a few flights.
 #[test]
 fn a_forest_has_a_row_an_arm() {
@@ -177,7 +190,7 @@ fn a_forest_has_a_row_an_arm() {
     // `phantom` flies beside them.
     assert_eq!(study.rows.len(), 3);
     assert!(forest::words(study)[0].starts_with("twcc_flat"));
-    for row in study.rows.iter().chain(&study.limited) {
+    for row in study.rows.iter().chain(&study.limited).chain(&study.away) {
         assert!(row.in_band.count <= row.through.count && row.ends.len() == 8);
         assert!(row.path_m <= 400.1 && row.displacement_m <= row.path_m, "{row:?}");
     }
@@ -185,4 +198,5 @@ fn a_forest_has_a_row_an_arm() {
         rows.iter().find(|row| row.arm == "twcc_plus").map(|row| row.ends.clone())
     };
     assert_eq!(ends(&study.rows), ends(&study.limited), "it has the limit in any case");
+    assert_ne!(ends(&study.limited), ends(&study.away), "other sides");
 }

@@ -24,10 +24,11 @@ const SEED: u64 = 11;
 
 /// Studies, the names of their journals, and of so many trials of each one is flown again: about
 /// thirty flights of each, and one training.
-const RECORDED: [(&str, &str, &str); 7] = [
+const RECORDED: [(&str, &str, &str); 8] = [
     ("faults", "faults", "1/31"),
     ("faults_together", "faults", "1/17"),
     ("forest", "forest", "1/113"),
+    ("forest_scarce", "forest", "1/113"),
     ("thrust", "thrust", "1/113"),
     ("table3", "table3", "1/31"),
     ("steering", "steering", "1/313"),
@@ -70,6 +71,7 @@ fn fly(name: &str, of: Of, keep: &Keep<'_>) -> Option<Value> {
         "faults" => json(faults::run(&plan(ours, 1000, 20), 1, keep).unwrap()),
         "faults_together" => json(faults::run(&plan(ours, 500, 20), 2, keep).unwrap()),
         "forest" => json(forest::run(&plan(arms, 105, 2), 2.0, keep).unwrap()),
+        "forest_scarce" => json(forest::run(&plan(&few, 105, 2), 1.3, keep).unwrap()),
         "thrust" => json(thrust::run(&plan(arms, 12, 2), keep).unwrap()),
         "table3" => json(table3::run(&plan(arms, 12, 2), keep).unwrap()),
         "steering" => {

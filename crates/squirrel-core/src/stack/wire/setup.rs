@@ -17,7 +17,7 @@ use crate::estimate::mekf::MekfParameters;
 use crate::estimate::navigator::{Filter, Navigation, Start};
 use crate::estimate::rkf::{Fading, RkfParameters};
 use crate::guidance::excite::{Leg, Line, Multisine, Programme};
-use crate::guidance::mission::{Mission, Steering};
+use crate::guidance::mission::{Mission, Steering, TurnSide};
 use crate::guidance::sensing::Sensing;
 use crate::guidance::trajectory::Trajectory;
 use crate::rnn::elman::{Dense, Elman, Recurrent};
@@ -260,7 +260,7 @@ wire_struct! {
     Dense<HIDDEN, 2> { weight, bias }
     Domain { speed_m_s, alpha_rad }
     Sensing { range_m, half_view_rad, speed_min_m_s }
-    Steering { min_rad, max_rad, ramp_s, both_sides, seed }
+    Steering { min_rad, max_rad, ramp_s, side, seed }
     Leg { duration_s, move_s, ramp_s, to, yaw_rad, wings_s }
     Multisine { lines }
     Line { frequency_hz, amplitude, phase }
@@ -271,6 +271,7 @@ wire_enum! {
     CommandKind { SpeedFraction, Duty, PwmMicroseconds, ThrustNewton }
     AttitudeForm { Euler, Quaternion }
     AngleLaw { SmallAngle, Exact }
+    TurnSide { Angle, Drawn, Away }
     WingTest { Normal, Acceleration }
     ThrustLaw { Literal, Exact }
     Trigger { Angle, AngleOrThrust }
