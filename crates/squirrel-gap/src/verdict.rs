@@ -193,7 +193,8 @@ pub struct Verdict {
     pub verdict: Kind,
     /// What is missing, the most certain first.
     pub effects: Vec<NamedEffect>,
-    /// What moved with the effects, the farthest first; empty without effects.
+    /// What moved with the effects, the farthest first; without effects, what moved by three of its
+    /// tolerances and more.
     pub moved: Vec<Moved>,
     /// Other sets, the best first.
     pub alternatives: Vec<Alternative>,

@@ -140,6 +140,17 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool
             )
         };
     }
+    if verdict.effects.is_empty()
+        && let Some(number) = verdict.moved.first()
+    {
+        let _ = write!(
+            text,
+            " Numbers of the file moved beyond their tolerance, which is too little for a name: {} by {:.1} tolerances{}.",
+            number.name,
+            number.far(),
+            if verdict.moved.len() > 1 { ", and others" } else { "" }
+        );
+    }
     if !blind.is_empty() && verdict.verdict != Kind::NotIdentifiable {
         let _ = write!(text, " These flights would not show: {}.", blind.join(", "));
     }

@@ -8,6 +8,7 @@ use crate::independent::twins::{
     Equation, angular_damping, flapping_moment, rotor_wash, vortex_ring, wing_moment,
     wing_tangential,
 };
+use crate::set::LOAD;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -269,14 +270,13 @@ pub const CATALOGUE: &[Entry] = &[
 
 /// Pairs of different kinds that flights tell apart only by the tolerances, or where one hides the
 /// other's only sign.
-const CONFOUNDED: [[&str; 2]; 8] = [
+const CONFOUNDED: [[&str; 2]; 7] = [
     ["weak_rotor", "cg_offset"],
     ["inertia_error", "yaw_torque_coeff"],
     ["inertia_error", "thrust_coefficient"],
     ["inertia_error", "mass_error"],
     ["accel_bias", "thrust_misalignment"],
     ["heading_bias", "constant_wind"],
-    ["payload_swing", "mass_error"],
     ["axial_inflow", "wing_membrane"],
 ];
 
@@ -372,7 +372,11 @@ impl Entry {
     /// Whether both can be told from flights that hide the two of them.
     pub fn goes_with(&self, other: &Entry) -> bool {
         let confounded = |pair: &[&str; 2]| pair.contains(&self.name) && pair.contains(&other.name);
-        self.kind != other.kind && !CONFOUNDED.iter().any(confounded)
+        let is_load = |entry: &Entry| entry.name == LOAD;
+        self.kind != other.kind
+            && !CONFOUNDED.iter().any(confounded)
+            && !is_load(self)
+            && !is_load(other)
     }
 }
 

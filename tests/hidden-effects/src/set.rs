@@ -145,10 +145,15 @@ impl Set {
             // Gusts have no size that a file could state too large: what blows on one day is not
             // what blows on another.
             Self::Overstated => CATALOGUE.iter().filter(|entry| entry.name != "gust").collect(),
+            Self::Two => CATALOGUE.iter().filter(|entry| entry.name != LOAD).collect(),
             _ => CATALOGUE.iter().collect(),
         }
     }
 }
+
+/// Flown by itself and calmly: dashes that show other effects swing it up to the horizontal, where
+/// nobody flies a load and nothing of its swing can be foreseen.
+pub(crate) const LOAD: &str = "payload_swing";
 
 /// What position and attitude from outside, commands and voltage can show. Slow forces: drag, wind,
 /// lift over speed and climb, the wings' and the ground's, thrust that follows the voltage or is

@@ -438,7 +438,7 @@ fn show(verdict: &Verdict) {
         effects(&verdict.effects);
     }
     if !verdict.moved.is_empty() {
-        moved(&verdict.moved);
+        moved(&verdict.moved, verdict.effects.is_empty());
     }
     if let Some(since) = &verdict.baseline {
         rotors(&since.rotors);
@@ -479,9 +479,10 @@ fn rotors(all: &[RotorHealth]) {
     }
 }
 
-/// What moved with the effects: their numbers hold with these.
-fn moved(all: &[Moved]) {
-    let mut table = Table::new(&["moved with them", "value", "sd", "tolerance"]);
+/// What moved with the effects: their numbers hold with these. Or what moved without any.
+fn moved(all: &[Moved], alone: bool) {
+    let what = if alone { "moved beyond its tolerance" } else { "moved with them" };
+    let mut table = Table::new(&[what, "value", "sd", "tolerance"]);
     for number in all {
         let mut row = vec![number.name.clone()];
         row.extend([number.value, number.sd, number.tolerance].map(|x| significant(x, 3)));

@@ -121,7 +121,7 @@ impl Plant {
     ) {
         if let Some(swing) = swing.filter(|_| state.led_s > 0.0) {
             let acceleration = (motion.velocity - state.body.velocity) * (1.0 / state.led_s);
-            swing.lead(&mut state.load, acceleration.vector.xy().into());
+            swing.lead(&mut state.load, acceleration.vector.into());
         }
         state.body = *motion;
         state.take_rotors(rotors);

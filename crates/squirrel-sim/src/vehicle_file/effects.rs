@@ -77,6 +77,8 @@ pub fn effects_page() -> String {
     let mut page = "# Effects\n\n\
         What a vehicle file may add to the base model, each in a table `[effects.<name>]` of its own. Sizes are those that are plausible on a\n\
         vehicle of 0.548 kg, and grow with what is said; +- marks those with a sign. Where there are forms, the first is taken without `form`.\n\
+        The head of `crates/squirrel-core/src/effects/<name>.rs` has the law of each with its source. `voltage_exponent` is that of the rotors'\n\
+        speed: thrust goes with twice of it. Isotropic linear drag acts in the rotors' plane, not along their axis.\n\
         This page is made from the code: `SQUIRREL_EFFECTS_WRITE=1 cargo test --release -p squirrel-sim --test it effects` writes it.\n\n\
         | effect | what it is | parameters | forms | what shows it |\n|---|---|---|---|---|\n"
         .to_owned();
