@@ -14,7 +14,7 @@ use std::marker::PhantomData;
 pub(crate) struct Quantity<V>(pub(crate) V);
 
 /// The long form. `low`, `high` and `domain` are what the gap workflow writes; they do not act
-/// here.
+/// here. [`check`] asks what they may be, as it knows the field's name.
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Detailed<V> {
@@ -88,34 +88,98 @@ pub struct Provenance {
 
 /// Every number of a vehicle file by its field, with provenance where it has any.
 pub(crate) fn provenance(table: &toml::Table) -> Vec<(String, Provenance)> {
+    let provenance = |item: &toml::Value| {
+        if !item.is_table() {
+            return Provenance { value: item.to_string(), ..Provenance::default() };
+        }
+        let text = |key: &str| {
+            item.get(key).map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned))
+        };
+        let value = text("value").unwrap_or_default();
+        Provenance { value, sd: text("sd"), source: text("source") }
+    };
+    all(table).into_iter().map(|(field, item)| (field, provenance(item))).collect()
+}
+
+/// Whether each `sd`, `low` and `high` of a vehicle file is one.
+///
+/// # Errors
+/// One line that names field, key and value.
+pub(crate) fn check(table: &toml::Table) -> Result<(), String> {
+    /// Its square is finite, also over that of a small number.
+    const SD_MAX: f64 = 1e100;
+    for (field, item) in all(table) {
+        let Some(value) = item.get("value") else { continue };
+        let wrong = |key: &str, given: &toml::Value, must: &str| {
+            Err(format!("{field}.{key} = {given}: must be {must}"))
+        };
+        if let Some(sd) = item.get("sd") {
+            if !numbers(sd).iter().all(|x| (0.0..=SD_MAX).contains(x)) {
+                return wrong("sd", sd, "finite, >= 0 and at most 1e100");
+            }
+            // A number by itself is that of all.
+            if sd.is_array() && !is_like(sd, value) {
+                return wrong("sd", sd, "one number, or as many as the value has");
+            }
+        }
+        let limits = ["low", "high"].map(|key| item.get(key).map(|x| (key, x, numbers(x))));
+        for (key, given, numbers) in limits.iter().flatten() {
+            if !numbers.iter().all(|x| x.is_finite()) {
+                return wrong(key, given, "finite");
+            }
+        }
+        if let [Some((key, given, low)), Some((_, most, high))] = &limits
+            && low.iter().zip(high).any(|(low, high)| low > high)
+        {
+            return wrong(key, given, &format!("at most {field}.high = {most}"));
+        }
+    }
+    Ok(())
+}
+
+/// The numbers of a value in their order.
+fn numbers(value: &toml::Value) -> Vec<f64> {
+    match value {
+        toml::Value::Float(x) => vec![*x],
+        toml::Value::Integer(n) => vec![*n as f64],
+        toml::Value::Array(list) => list.iter().flat_map(numbers).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Whether a list has as many entries as a value, and each list in it, too; the diagonal of a matrix
+/// may stand for its rows.
+fn is_like(list: &toml::Value, value: &toml::Value) -> bool {
+    match (list.as_array(), value.as_array()) {
+        (Some(list), Some(value)) => {
+            list.len() == value.len() && list.iter().zip(value).all(|(a, b)| is_like(a, b))
+        }
+        (list, _) => list.is_none(),
+    }
+}
+
+/// Every number of a vehicle file by its field: as itself, or in its long form a table.
+fn all(table: &toml::Table) -> Vec<(String, &toml::Value)> {
     let mut all = Vec::new();
-    walk(&toml::Value::Table(table.clone()), String::new(), &mut all);
+    inside(table, "", &mut all);
     all
 }
 
-fn walk(value: &toml::Value, field: String, all: &mut Vec<(String, Provenance)>) {
+fn inside<'a>(table: &'a toml::Table, field: &str, all: &mut Vec<(String, &'a toml::Value)>) {
+    for (key, inner) in table {
+        walk(inner, if field.is_empty() { key.clone() } else { format!("{field}.{key}") }, all);
+    }
+}
+
+fn walk<'a>(value: &'a toml::Value, field: String, all: &mut Vec<(String, &'a toml::Value)>) {
     match value {
-        toml::Value::Table(table) if table.contains_key("value") => {
-            let text = |key: &str| {
-                table.get(key).map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned))
-            };
-            let value = text("value").unwrap_or_default();
-            all.push((field, Provenance { value, sd: text("sd"), source: text("source") }));
-        }
-        toml::Value::Table(table) => {
-            for (key, inner) in table {
-                let name = if field.is_empty() { key.clone() } else { format!("{field}.{key}") };
-                walk(inner, name, all);
-            }
-        }
+        toml::Value::Table(table) if !table.contains_key("value") => inside(table, &field, all),
         toml::Value::Array(list) if list.iter().all(toml::Value::is_table) => {
             for (i, inner) in list.iter().enumerate() {
                 walk(inner, format!("{field}[{i}]"), all);
             }
         }
         toml::Value::String(_) => {}
-        other => {
-            all.push((field, Provenance { value: other.to_string(), ..Provenance::default() }));
-        }
+        number => all.push((field, number)),
     }
 }

@@ -137,3 +137,40 @@ fn what_does_not_fly_is_not_called_sound() {
         folder.fails(&fly, &["error: v.toml: ", field]);
     }
 }
+
+/// What a number is known to is a number, too.
+#[test]
+fn a_tolerance_that_cannot_be_is_refused_where_the_file_is_read() {
+    let folder = Folder::new("vehicle_sd");
+    let (mass, inertia) = ("sd = 0.0011", "sd = [3e-5, 5e-5, 8e-5]");
+    for (from, to, words) in [
+        (mass, "sd = -0.1", "mass.mass_kg.sd = -0.1: must be finite, >= 0"),
+        (mass, "sd = nan", "mass.mass_kg.sd = nan"),
+        (mass, "sd = inf", "mass.mass_kg.sd = inf"),
+        (mass, "sd = 1e308", "mass.mass_kg.sd = 1"),
+        (mass, "sd = [0.1]", "mass.mass_kg.sd = [0.1]: must be one number"),
+        (mass, "low = nan", "mass.mass_kg.low = nan: must be finite"),
+        (mass, "high = -inf", "mass.mass_kg.high = -inf: must be finite"),
+        (mass, "low = 2.0, high = 1.5", "low = 2.0: must be at most mass.mass_kg.high = 1.5"),
+        (inertia, "sd = [3e-5, -1, 8e-5]", "mass.inertia_kg_m2.sd = "),
+        (inertia, "sd = [3e-5, 5e-5]", "as many as the value has"),
+        ("sd = [8.5e-4, ", "sd = [-8.5e-4, ", "rotor[0].position_body_m.sd = "),
+    ] {
+        assert!(SQUIRREL.contains(from));
+        folder.write("v.toml", &SQUIRREL.replacen(from, to, 1));
+        folder.fails(&["vehicle", "check", "v.toml"], &["error: v.toml: ", words]);
+    }
+    for (from, to) in [
+        (mass, "sd = 0"),
+        (mass, "low = 0.5, high = 1"),
+        (inertia, "sd = 3e-5"),
+        (
+            "value = [3.22e-3, 4.68e-3, 7.72e-3]",
+            "value = [[3e-3, 0, 0], [0, 4e-3, 0], [0, 0, 6e-3]]",
+        ),
+    ] {
+        assert!(SQUIRREL.contains(from));
+        folder.write("v.toml", &SQUIRREL.replacen(from, to, 1));
+        folder.succeeds(&["vehicle", "check", "v.toml"]);
+    }
+}

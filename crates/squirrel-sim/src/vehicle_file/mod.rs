@@ -171,8 +171,10 @@ impl VehicleFile {
         };
         let tables: tables::VehicleTable = toml::from_str(text).map_err(|e| syntax(&e))?;
         let raw: toml::Table = text.parse().map_err(|e| syntax(&e))?;
-        let built = build::build(tables, |name| {
-            weights(name).map_err(|error| format!("wing.parnn_weights = {name}: {error}"))
+        let built = crate::quantity::check(&raw).and_then(|()| {
+            build::build(tables, |name| {
+                weights(name).map_err(|error| format!("wing.parnn_weights = {name}: {error}"))
+            })
         });
         let mut built =
             built.map_err(|problem| VehicleFileError::Field { file: file.to_owned(), problem })?;
