@@ -141,6 +141,21 @@ fn a_training_that_was_killed_goes_on_to_the_same_bytes() {
 }
 
 #[test]
+fn a_checkpoint_that_is_there_is_not_written_over() {
+    let folder = with_flights("checkpoint_there", &["a"]);
+    folder.write("w.checkpoint.safetensors", "of somebody else");
+    for (model, epochs) in [("flat_plate", "1"), ("vanilla", "60")] {
+        let train = ["train", model, "--flights", "f", "--epochs", epochs];
+        folder.fails(
+            &[&train[..], &["--out", "w.safetensors"]].concat(),
+            &["w.checkpoint.safetensors: is there already", "--resume", "delete"],
+        );
+    }
+    let left = fs::read_to_string(folder.0.join("w.checkpoint.safetensors")).unwrap();
+    assert_eq!(left, "of somebody else");
+}
+
+#[test]
 fn what_cannot_be_trained_on_gets_one_line() {
     let folder = with_flights("bad", &["a", "b"]);
     let fails = |extra: &[&str], words: &[&str]| {
