@@ -144,10 +144,14 @@ impl Paths {
             }
             taken.insert(id, (result, "each result needs a file of its own"));
         }
-        self.writes
-            .iter()
-            .filter(|given| !self.is_yet_to_be(given))
-            .try_for_each(|given| writable(&given.path))
+        for given in &self.writes {
+            if !self.is_yet_to_be(given) {
+                writable(&given.path)?;
+            } else if let Some(file) = no_folder(&given.path) {
+                return Err(format!("{}: is a file, must be a folder", file.display()));
+            }
+        }
+        Ok(())
     }
 
     /// Whether a result's folder is missing, and the command makes it.
@@ -157,6 +161,11 @@ impl Paths {
         };
         result.in_folder || FileId::read(folder).is_some_and(|id| self.makes.contains(&id))
     }
+}
+
+/// What is there, above a path, and no folder: nothing can be made in it.
+fn no_folder(path: &Path) -> Option<&Path> {
+    path.ancestors().skip(1).find(|above| above.exists()).filter(|above| !above.is_dir())
 }
 
 /// Asks whether a result could be written.

@@ -10,7 +10,7 @@ use squirrel_gap::{
     Baseline, ClosedLoop, Flights, GapError, Kind, Moved, NamedEffect, Patched, RotorHealth, Value,
     Verdict, Workflow, significant,
 };
-use squirrel_log::FlightLog;
+use squirrel_log::{FlightLog, files};
 use squirrel_sim::scenario::pilot_card;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::ffi::{OsStr, OsString};
@@ -283,12 +283,14 @@ impl Given {
     }
 
     fn add(&self, effect: Option<&str>, fit: bool, dry_run: bool) -> Result<(), String> {
-        if dry_run {
+        let earlier = if dry_run {
             self.check(&[])?;
+            None
         } else {
             self.patch_path()?;
             self.check(&[&self.patch_name(), VERDICT.as_ref()])?;
-        }
+            self.earlier_patch()?
+        };
         let mut found = self.diagnose()?;
         show(&found.diagnosis.verdict);
         let patched = match effect {
@@ -301,8 +303,9 @@ impl Given {
             }
             output::write_json(self.json.as_deref(), &found.diagnosis.verdict)?;
         } else {
-            if let Ok(patched) = &patched {
-                self.patch(&patched.text, &mut found.diagnosis.verdict)?;
+            match &patched {
+                Ok(patched) => self.patch(&patched.text, &mut found.diagnosis.verdict)?,
+                Err(_) => remove(earlier)?,
             }
             self.write(&found.diagnosis.verdict)?;
         }
@@ -312,6 +315,7 @@ impl Given {
     fn everything(&self, fit: bool) -> Result<(), String> {
         self.patch_path()?;
         self.check(&[&self.patch_name(), REPORT.as_ref(), VERDICT.as_ref()])?;
+        let earlier = self.earlier_patch()?;
         let (vehicle, flights, held_out) = self.read()?;
         // Whatever it finds, the verdict is what it would be without.
         let own = fitted(&vehicle, &self.baseline)?;
@@ -328,7 +332,10 @@ impl Given {
         show(&found.diagnosis.verdict);
         match &patched {
             Ok(patched) => self.patch(&patched.text, &mut found.diagnosis.verdict)?,
-            Err(why) => say(why),
+            Err(why) => {
+                say(why);
+                remove(earlier)?;
+            }
         }
         self.report(&found, patched.as_ref().ok())?;
         self.write(&found.diagnosis.verdict)
@@ -362,6 +369,27 @@ impl Given {
         name
     }
 
+    /// The patched vehicle file of an earlier run, which goes where this one patches nothing: it
+    /// would be taken for a part of the new answer.
+    ///
+    /// # Errors
+    /// There is a file that no run has made.
+    fn earlier_patch(&self) -> Result<Option<PathBuf>, String> {
+        let path = self.patch_path()?;
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let text = files::read_text(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        // Whatever is patched names the flights that its number is from.
+        if ["source = \"gap", "source = 'gap"].iter().any(|mark| text.contains(mark)) {
+            return Ok(Some(path));
+        }
+        Err(format!(
+            "--out: {}: is there, and not of an earlier run; the patched vehicle goes there, give another folder",
+            path.display()
+        ))
+    }
+
     /// Writes the patched vehicle file.
     fn patch(&self, text: &str, verdict: &mut Verdict) -> Result<(), String> {
         let path = self.patch_path()?;
@@ -387,6 +415,14 @@ impl Given {
         }
         output::write_json(self.json.as_deref(), verdict)
     }
+}
+
+/// Removes what an earlier run has left.
+fn remove(earlier: Option<PathBuf>) -> Result<(), String> {
+    let Some(path) = earlier else { return Ok(()) };
+    std::fs::remove_file(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    talk(&format!("removed {}: of an earlier run", path.display()));
+    Ok(())
 }
 
 /// Flies held-out flights again with the effects added.

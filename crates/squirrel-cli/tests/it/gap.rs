@@ -320,6 +320,30 @@ fn the_vehicle_file_is_never_overwritten() {
     assert_eq!(fs::read_to_string(folder.0.join("squirrel.toml")).unwrap(), SQUIRREL);
 }
 
+/// A patched vehicle file beside a verdict is taken for a part of it.
+#[test]
+fn a_patch_of_before_does_not_stay_beside_a_verdict_without_one() {
+    let folder = Folder::new("gap-stale-patch");
+    folder.write("v.toml", &SQUIRREL.replacen("parnn_weights", "# parnn_weights", 1));
+    folder.succeeds(&["fly", "--scenario", "track", "--seed", "1", "--out", "f.mcap"]);
+    fs::create_dir(folder.0.join("out")).unwrap();
+    folder.write("out/v.toml", SQUIRREL);
+    let given = ["--vehicle", "v.toml", "--flights", "f.mcap", "--out"];
+    for step in ["add", "run"] {
+        let gap = [&["gap", step], &given[..]].concat();
+        // Nobody knows whose it is.
+        folder.fails(&[&gap[..], &["out"]].concat(), &["out/v.toml", "not of an earlier run"]);
+        for no_folder in ["f.mcap", "f.mcap/out"] {
+            folder.fails(&[&gap[..], &[no_folder]].concat(), &["f.mcap: is a file, must be a"]);
+        }
+    }
+    let patch = r#"extra_time_constant_s = { value = 0.01, source = "gap: f.mcap" }"#;
+    folder.write("out/v.toml", &format!("{SQUIRREL}\n[effects.motor_lag]\n{patch}\n"));
+    folder.succeeds(&[&["gap", "run"], &given[..], &["out"]].concat());
+    assert!(json(&folder, "out/verdict.json")["model_patch"].is_null());
+    assert!(!folder.0.join("out/v.toml").exists());
+}
+
 #[test]
 fn the_same_flights_give_the_same_bytes() {
     let made = |name| {
