@@ -145,7 +145,9 @@ impl Reach {
         let descents_deg = or(&self.descent_deg, down.atan2(level).to_degrees());
         let ratios =
             or(&self.ratios, self.thrust_to_weight.unwrap_or(p.limits.thrust_max_n / weight_n));
-        finite("--descent-deg", &descents_deg)?;
+        if let Some(wrong) = descents_deg.iter().find(|x| !(-90.0..=90.0).contains(*x)) {
+            return Err(format!("--descent-deg = {wrong}: must be -90 to 90"));
+        }
         if let Some(wrong) = speeds.iter().find(|x| !(**x >= 0.0 && x.is_finite())) {
             return Err(format!("--speeds = {wrong}: must be finite and >= 0"));
         }

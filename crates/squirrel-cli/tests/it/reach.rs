@@ -50,7 +50,7 @@ fn a_sweep_is_a_table_a_json_and_a_page() {
 #[test]
 fn what_cannot_be_asked_is_one_line() {
     let folder = Folder::new("reach-refused");
-    let cases: [(&[&str], &[&str]); 10] = [
+    let cases: [(&[&str], &[&str]); 12] = [
         (&["--wing", "paper"], &["--wing = paper", "flat, membrane, parnn"]),
         (&["--tilt", "ball"], &["--tilt = ball", "box, cone"]),
         (&["--thrust-to-weight", "0"], &["--thrust-to-weight = 0", "> 0"]),
@@ -59,6 +59,8 @@ fn what_cannot_be_asked_is_one_line() {
         (&["--velocity", "NaN,0,0"], &["--velocity = NaN", "finite"]),
         (&["--velocity", "1,2"], &["--velocity", "2 numbers"]),
         (&["--speeds=-1"], &["--speeds = -1"]),
+        (&["--descent-deg", "37,91"], &["--descent-deg = 91", "-90 to 90"]),
+        (&["--descent-deg", "NaN"], &["--descent-deg = NaN"]),
         (&["--yaw-rad", "inf"], &["--yaw-rad = inf"]),
         (&["--html", "nowhere/r.html"], &["nowhere/r.html"]),
     ];

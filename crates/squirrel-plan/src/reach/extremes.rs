@@ -15,8 +15,9 @@ use squirrel_core::math::GRAVITY_M_S2;
 
 /// Horizontal speed below which there is nothing to brake, m/s.
 const BRAKING_SPEED_MIN_M_S: f64 = 1e-3;
-/// What is not above this is rounding, or points the other way.
-const NOTHING: f64 = 1e-9;
+/// What is not above this is rounding, or points the other way: where thrust is just the weight, a
+/// last bit of it tilts a vehicle by the root of two such bits, which g makes 2e-7 m/s^2 of.
+const NOTHING: f64 = 1e-6;
 /// Steps of a search along each of the two numbers of an attitude.
 const SAMPLES: usize = 40;
 /// Peaks that are refined.

@@ -103,3 +103,17 @@ fn the_table_at_seven_metres_a_second_comes_out() {
         held(ratio).with_wings
     });
 }
+
+/// What is left of climbing and of braking is rounding there, and no measure of what wings add.
+#[test]
+fn where_thrust_is_just_the_weight_there_is_no_ratio() {
+    for speed_m_s in [3.0, 5.0, 7.0, 9.0] {
+        let question = question(1.0, [speed_m_s, 0.0, 0.0], ROLL_AND_PITCH, &flat());
+        let found = Reach::new(&question).unwrap().extremes();
+        let level = found.braking_level_m_s2.unwrap();
+        for both in [found.upward_m_s2, level] {
+            assert!(both.ratio().is_nan(), "{speed_m_s} m/s: {both:?}");
+            assert!(both.with_wings > 0.01, "{speed_m_s} m/s: {both:?}");
+        }
+    }
+}
