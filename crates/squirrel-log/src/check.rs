@@ -3,7 +3,7 @@
 use super::{FlightLog, LogError, Source, schema};
 
 /// Times are stored in whole nanoseconds beside their exact value; later ones do not fit 64 bits.
-const TIME_MAX_S: f64 = 1.8e10;
+pub(crate) const TIME_MAX_S: f64 = 1.8e10;
 
 /// Longest time between two samples of a flight, s.
 const JUMP_S: f64 = 3600.0;

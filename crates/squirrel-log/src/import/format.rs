@@ -77,6 +77,10 @@ pub(super) fn format(path: &Path) -> Result<Format, ImportError> {
     }
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     match extension.as_str() {
+        "csv" if is_utf16(&start) => {
+            let problem = "is UTF-16 text; import reads UTF-8: `iconv -f UTF-16 -t UTF-8`";
+            Err(ImportError::Damaged { file, problem: problem.to_owned() })
+        }
         "csv" => Ok(Format::Csv),
         "parquet" => Ok(Format::Parquet),
         "mat" => Ok(Format::Mat),
@@ -87,6 +91,16 @@ pub(super) fn format(path: &Path) -> Result<Format, ImportError> {
         "bin" => Ok(Format::ArduPilot),
         "bbl" | "bfl" => Ok(Format::Blackbox),
         _ => Err(ImportError::UnknownFormat { file }),
+    }
+}
+
+/// Whether a text has two bytes a letter: by its mark, or as every other byte is zero.
+fn is_utf16(start: &[u8]) -> bool {
+    let is_letter = |byte: u8| (b' '..=b'~').contains(&byte);
+    match *start {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => true,
+        [a, 0, b, 0, ..] | [0, a, 0, b, ..] => is_letter(a) && is_letter(b),
+        _ => false,
     }
 }
 

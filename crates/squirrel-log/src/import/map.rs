@@ -293,6 +293,13 @@ fn channel_map(name: String, toml: ChannelToml) -> Result<ChannelMap, String> {
         let wanted = width.map_or("at least 1".to_owned(), |width| width.to_string());
         return Err(format!("columns: wants {wanted}, got {count}"));
     }
+    // Both wings may follow one signal; axes and rotors are each something else.
+    if !matches!(kind, Kind::Numbers(_) | Kind::Free)
+        && let Some(twice) =
+            (1..count).find_map(|i| toml.columns[..i].iter().find(|c| **c == toml.columns[i]))
+    {
+        return Err(format!("columns: `{twice}` is there more than once"));
+    }
     let turn = turn(&toml, kind)?;
     let scale = per_column("scale", toml.scale, 1.0, count)?;
     if scale.contains(&0.0) {

@@ -112,11 +112,16 @@ pub use reading::Reading;
 pub use report::{AbsentChannel, ChannelReport, FileReport, Gaps, ImportReport};
 
 use crate::FlightLog;
+use crate::check::TIME_MAX_S;
 use map::SourceMap;
 use mask::Condition;
 use meter::Meter;
 use names::nearest;
 use table::{Table, TableFile};
+
+/// Gyroscopes are logged at 8 to 32 kHz at most; a file in ms that is taken for one in us comes out
+/// a thousand times as fast.
+const RATE_MAX_HZ: f64 = 5e4;
 
 /// Imports one flight.
 ///
@@ -260,7 +265,18 @@ fn import_of(
             bytes_cut: table.bytes_cut,
         });
         let time_s: Vec<f64> = times[index].iter().map(|t| t - zero_s).collect();
+        check_end(source, table, rows, &time_s)?;
+        let before = report.channels.len();
         build::add_source(&mut log, &mut report, map, source, table, &time_s, rows)?;
+        let rates = report.channels[before..].iter();
+        let too_fast = rates
+            .filter_map(|channel| Some((&channel.channel, channel.rate_hz?)))
+            .find(|(_, rate_hz)| *rate_hz > RATE_MAX_HZ);
+        report.notes.extend(too_fast.map(|(channel, rate_hz)| {
+            format!(
+                "{channel}: at {rate_hz:.1e} Hz, faster than flights are logged: the map's time unit may be wrong"
+            )
+        }));
     }
     turn::turn(&mut log, &mut report, map, &sources)?;
     let mut imported_from = names;
@@ -405,6 +421,25 @@ fn spans(kept: &[bool], time_s: &[f64]) -> Vec<(f64, f64)> {
 
 fn inside(spans: &[(f64, f64)], t: f64) -> bool {
     spans.get(spans.partition_point(|span| span.1 < t)).is_some_and(|span| span.0 <= t)
+}
+
+/// The times of the log must be those that it can hold.
+fn check_end(
+    source: &SourceMap,
+    table: &Table,
+    rows: &[usize],
+    time_s: &[f64],
+) -> Result<(), ImportError> {
+    match rows.iter().find(|row| !(time_s[**row] <= TIME_MAX_S)) {
+        None => Ok(()),
+        Some(&row) => Err(ImportError::Cell {
+            file: table.name.clone(),
+            column: source.time.column.clone(),
+            row: table.rows[row],
+            value: format!("{:e}", table.column(&source.time.column)[row]),
+            problem: "is too long after the first time: a log holds 1.8e10 s",
+        }),
+    }
 }
 
 /// The kept rows must exist and their time must increase.

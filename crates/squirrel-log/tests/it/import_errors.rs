@@ -33,6 +33,10 @@ fn a_bad_file_names_file_column_row_and_value() {
             "f.csv, column `t`, row 3: time repeats: 0.5 after 0.5 in row 2",
         ),
         (
+            "t,x,y,z\n0,1,2,3\n1e300,1,2,3\n",
+            "f.csv, column `t`, row 3: `1e300` is too long after the first time: a log holds 1.8e10 s",
+        ),
+        (
             "t,x,y,z\n0,,nan,\n1,,NaN,\n",
             "f.csv, columns x, y, z: `imu.omega_body_rad_s` has no number in any kept row",
         ),
@@ -51,6 +55,38 @@ fn bytes_that_are_no_text_are_an_error_not_a_panic() {
         let message = flight.message(&flight.import_file(&one_source(OMEGA)).unwrap_err());
         assert!(message.starts_with("f.csv") && !message.contains('\n'), "{message}");
     }
+}
+
+/// As a spreadsheet saves "Unicode text", with and without its mark.
+#[test]
+fn text_of_two_bytes_a_letter_is_told_as_such() {
+    let flight = Flight::new("utf-16", &[]);
+    let little: Vec<u8> = GOOD_CSV.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let big: Vec<u8> = GOOD_CSV.encode_utf16().flat_map(u16::to_be_bytes).collect();
+    for bytes in
+        [[b"\xff\xfe", &little[..]].concat(), [b"\xfe\xff", &big[..]].concat(), little, big]
+    {
+        flight.write("f.csv", &bytes);
+        let message = flight.message(&flight.import_file(&one_source(OMEGA)).unwrap_err());
+        assert!(message.starts_with("f.csv: is UTF-16 text; import reads UTF-8"), "{message}");
+    }
+}
+
+#[test]
+fn a_rate_that_no_log_has_is_told_with_the_unit_of_time() {
+    let rows = |step: f64| -> String {
+        (0..5).map(|i| format!("{},{i},2,3\n", f64::from(i) * step)).collect()
+    };
+    let notes = |step| {
+        let csv = format!("t,x,y,z\n{}", rows(step));
+        let flight = Flight::new("rate", &[("f.csv", &csv)]);
+        flight.import_file(&one_source(OMEGA)).unwrap().1.notes
+    };
+    assert!(notes(1e-4).is_empty());
+    let told = notes(1e-6);
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].starts_with("imu.omega_body_rad_s: at 1.0e6 Hz"), "{told:?}");
+    assert!(told[0].ends_with("the map's time unit may be wrong"), "{told:?}");
 }
 
 #[test]
@@ -112,6 +148,12 @@ fn a_bad_channel_says_what_to_write() {
             r#"columns = ["x"], rotors = [1]"#.into(),
             "`rotors` means nothing for this channel: leave it out",
         ),
+        (
+            "imu.omega_body_rad_s",
+            r#"columns = ["x", "y", "x"], body = "frd""#.into(),
+            "columns: `x` is there more than once",
+        ),
+        ("rotor.command", r#"columns = ["x", "x"]"#.into(), "columns: `x` is there more than once"),
         ("rotor.command", "columns = []".into(), "columns: wants at least 1, got 0"),
         (
             "rotor.command",
