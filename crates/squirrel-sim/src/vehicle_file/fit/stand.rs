@@ -47,16 +47,36 @@ pub struct StandFit {
     pub residual_n: f64,
 }
 
-const COLUMNS: [(&str, usize, f64, f64); 9] = [
-    ("thrust_n", 0, 1.0, 0.0),
-    ("thrust_g", 0, 1e-3 * GRAVITY_M_S2, 0.0),
-    ("thrust_kgf", 0, GRAVITY_M_S2, 0.0),
-    ("rotor_speed_rad_s", 1, 1.0, 0.0),
-    ("rotor_speed_rpm", 1, std::f64::consts::TAU / 60.0, 0.0),
-    ("command", 2, 1.0, 0.0),
-    ("command_pwm_us", 2, 1e-3, -1.0),
-    ("torque_n_m", 3, 1.0, 0.0),
-    ("voltage_v", 4, 1.0, 0.0),
+/// A column: its name, which list it fills, and what a cell can be at all, in its own unit. What is
+/// not is of another unit, or of another column.
+struct Column {
+    name: &'static str,
+    list: usize,
+    scale: f64,
+    offset: f64,
+    can_be: [f64; 2],
+}
+
+const fn column(
+    name: &'static str,
+    list: usize,
+    [scale, offset]: [f64; 2],
+    can_be: [f64; 2],
+) -> Column {
+    Column { name, list, scale, offset, can_be }
+}
+
+const COLUMNS: [Column; 9] = [
+    // A scale that is not zeroed shows a little less than nothing.
+    column("thrust_n", 0, [1.0, 0.0], [-1e4, 1e4]),
+    column("thrust_g", 0, [1e-3 * GRAVITY_M_S2, 0.0], [-1e6, 1e6]),
+    column("thrust_kgf", 0, [GRAVITY_M_S2, 0.0], [-1e3, 1e3]),
+    column("rotor_speed_rad_s", 1, [1.0, 0.0], [0.0, 2e4]),
+    column("rotor_speed_rpm", 1, [std::f64::consts::TAU / 60.0, 0.0], [0.0, 2e5]),
+    column("command", 2, [1.0, 0.0], [0.0, 1.0]),
+    column("command_pwm_us", 2, [1e-3, -1.0], [1000.0, 2000.0]),
+    column("torque_n_m", 3, [1.0, 0.0], [-1e3, 1e3]),
+    column("voltage_v", 4, [1.0, 0.0], [0.1, 1e3]),
 ];
 
 impl Stand {
@@ -77,13 +97,13 @@ impl Stand {
             .split(',')
             .map(|n| n.trim().trim_matches('"'))
             .collect();
-        let mut places: [Option<(usize, f64, f64)>; 5] = [None; 5];
-        for (column, own) in names.iter().enumerate() {
-            if let Some((_, what, scale, offset)) = COLUMNS.iter().find(|(key, ..)| key == own) {
-                if places[*what].is_some() {
+        let mut places: [Option<(usize, &Column)>; 5] = [None; 5];
+        for (place, own) in names.iter().enumerate() {
+            if let Some(column) = COLUMNS.iter().find(|column| column.name == *own) {
+                if places[column.list].is_some() {
                     return Err(format!("{name}: {own}: a second column for the same"));
                 }
-                places[*what] = Some((column, *scale, *offset));
+                places[column.list] = Some((place, column));
             }
         }
         if places[0].is_none() {
@@ -108,17 +128,19 @@ impl Stand {
                 &mut stand.voltage_v,
             ];
             for (list, place) in lists.into_iter().zip(places) {
-                let Some((column, scale, offset)) = place else { continue };
-                let cell = cells.get(column).map_or("", |cell| cell.trim());
-                let value =
-                    cell.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(|| {
-                        format!(
-                            "{name}, line {}: {} = {cell}: is no number",
-                            row + 1,
-                            names[column]
-                        )
-                    })?;
-                list.push(value * scale + offset);
+                let Some((place, column)) = place else { continue };
+                let cell = cells.get(place).map_or("", |cell| cell.trim());
+                let wrong = |what: &str| {
+                    Err(format!("{name}, line {}: {} = {cell}: {what}", row + 1, column.name))
+                };
+                let Some(value) = cell.parse::<f64>().ok().filter(|x| x.is_finite()) else {
+                    return wrong("is no number");
+                };
+                let [low, high] = column.can_be;
+                if !(low..=high).contains(&value) {
+                    return wrong(&format!("must be {low} to {high}"));
+                }
+                list.push(value * column.scale + column.offset);
             }
         }
         Ok(stand)

@@ -64,6 +64,13 @@ fn stands_that_say_nothing_are_refused_by_place() {
         ("thrust_n,command\n1,x\n", "line 2: command = x"),
         ("thrust_n,command\n1,0.5\n2\n", "line 3: command = "),
         ("thrust_n,thrust_g,command\n1,1,1\n", "thrust_g: a second"),
+        ("thrust_n,command_pwm_us\n1,1500\n1,0.2\n", "line 3: command_pwm_us = 0.2: must be 1000"),
+        ("thrust_n,command\n1,-0.1\n", "line 2: command = -0.1: must be 0 to 1"),
+        ("thrust_n,command\n1,55\n", "line 2: command = 55"),
+        ("thrust_n,command,voltage_v\n1,0.5,0\n", "line 2: voltage_v = 0: must be 0.1 to 1000"),
+        ("thrust_n,command,voltage_v\n1,0.5,16000\n", "line 2: voltage_v = 16000"),
+        ("thrust_n,rotor_speed_rpm\n1,-5\n", "line 2: rotor_speed_rpm = -5"),
+        ("thrust_n,command,torque_n_m\n1,0.5,1e4\n", "line 2: torque_n_m = 1e4"),
     ] {
         let error = Stand::parse(text, "s.csv").unwrap_err();
         assert!(error.starts_with("s.csv") && error.contains(word), "{error}");
