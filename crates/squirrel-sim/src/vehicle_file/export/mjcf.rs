@@ -30,6 +30,8 @@ const BALL_M: f64 = 0.01;
 
 pub(super) fn text(flat: &Flat, keeps: &Keeps) -> String {
     let name = super::plain_name(&flat.name);
+    // A comment has no two hyphens in a row.
+    let said = name.replace("--", "-_");
     let j = &flat.inertia_kg_m2;
     let d = digits;
     let viscosity = keeps.linear_of(flat)[0] / (6.0 * PI * BALL_M);
@@ -40,7 +42,7 @@ pub(super) fn text(flat: &Flat, keeps: &Keeps) -> String {
     let mut out = String::new();
     let _ = writeln!(
         out,
-        "<!-- {name}: world NWU, body FLU, SI. Control: thrust of each rotor, N. Made by squirrel vehicle export, target mjcf. -->\n\
+        "<!-- {said}: world NWU, body FLU, SI. Control: thrust of each rotor, N. Made by squirrel vehicle export, target mjcf. -->\n\
          <mujoco model=\"{name}\">\n  \
          <compiler angle=\"radian\" autolimits=\"true\"/>\n  \
          <option gravity=\"0 0 {}\" timestep=\"0.001\" integrator=\"RK4\" density=\"{}\" viscosity=\"{}\" wind=\"{}\"/>\n  \

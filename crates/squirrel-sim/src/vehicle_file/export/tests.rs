@@ -147,6 +147,21 @@ fn files_are_well_formed() {
     }
 }
 
+/// Two hyphens in a row end a comment of XML.
+#[test]
+fn a_name_ends_no_comment() {
+    let text = SQUIRREL_TOML.replacen("name = \"squirrel\"", "name = \"a---b\"", 1);
+    let file = VehicleFile::parse(&text, "a---b").unwrap();
+    for target in [Target::Sdf, Target::Mjcf] {
+        let text = export(&file, target).unwrap().text;
+        assert!(text.contains("=\"a---b\""), "{target:?}: its name elsewhere");
+        for comment in text.split("<!--").skip(1) {
+            let comment = comment.split("-->").next().unwrap();
+            assert!(!comment.contains("--") && !comment.ends_with('-'), "{target:?}: {comment}");
+        }
+    }
+}
+
 /// Rotors are links of their own there: with the body they must weigh and turn as the vehicle does.
 #[test]
 fn links_of_sdf_add_up_to_the_vehicle() {
