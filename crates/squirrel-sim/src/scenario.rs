@@ -125,6 +125,9 @@ pub enum MissionTable {
     Runs(RunsTable),
 }
 
+/// Thinner ones are nothing that a vehicle could hit: the world has none, m.
+const OBSTACLE_RADIUS_MIN_M: f64 = 1e-3;
+
 /// Names of the built-in scenarios.
 pub const BUILT_IN: [&str; 9] = [
     "hover",
@@ -306,9 +309,10 @@ impl Scenario {
             ));
         }
         for (i, [north, east, radius]) in self.obstacles.iter().enumerate() {
-            if !(north.abs() <= 1e5 && east.abs() <= 1e5 && *radius > 0.0 && *radius <= 100.0) {
+            let has_place = north.abs() <= 1e5 && east.abs() <= 1e5;
+            if !(has_place && (OBSTACLE_RADIUS_MIN_M..=100.0).contains(radius)) {
                 return Err(format!(
-                    "obstacles[{i}] = [{north}, {east}, {radius}]: must be finite, radius > 0 and <= 100"
+                    "obstacles[{i}] = [{north}, {east}, {radius}]: must be finite, the radius {OBSTACLE_RADIUS_MIN_M} to 100"
                 ));
             }
         }
@@ -439,6 +443,10 @@ mod tests {
         );
         assert!(
             error("duration_s = 13.0", "duration_s = nan").starts_with("s.toml: duration_s = NaN")
+        );
+        assert_eq!(
+            error("0.0, 0.5]", "0.0, 0.0005]"),
+            "s.toml: obstacles[0] = [32.85, 0, 0.0005]: must be finite, the radius 0.001 to 100"
         );
         assert!(error("range_m", "rnage_m").contains("s.toml, line"));
         assert!(

@@ -1,6 +1,7 @@
 //! `squirrel plan` and `squirrel fly --reference` as a program.
 
 use super::support::{Folder, json};
+use squirrel_sim::scenario::Scenario;
 use std::fs;
 
 #[test]
@@ -85,7 +86,12 @@ fn what_cannot_be_planned_or_followed_is_one_line() {
         "low.toml",
         "name = \"low\"\nduration_s = 5.0\nheight_m = 25.0\n[mission]\nkind = \"hover\"\n",
     );
+    let avoid = Scenario::find("avoid").unwrap();
+    let thin = Scenario { solid_obstacles: true, obstacles: vec![[30.0, 0.0, 5e-4]], ..avoid };
+    folder.write("thin.toml", &thin.to_toml());
     for (arguments, word) in [
+        (vec!["plan", "--scenario", "thin.toml"], "thin.toml: obstacles[0] = [30, 0, 0.0005]"),
+        (vec!["fly", "--scenario", "thin.toml"], "thin.toml: obstacles[0] = [30, 0, 0.0005]"),
         (
             vec!["fly", "--reference", "p.mcap", "--scenario", "hover", "--out", "none/f.mcap"],
             "none/f.mcap: ",

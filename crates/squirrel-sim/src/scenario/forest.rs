@@ -5,6 +5,7 @@
 //! interval drawn anew. The flight begins in the middle, where there is a gap, and ends with the
 //! first contact or after its way.
 
+use super::OBSTACLE_RADIUS_MIN_M;
 use crate::setting::SettingError;
 use squirrel_core::guidance::mission::scramble;
 
@@ -37,14 +38,15 @@ impl ForestTable {
 
     pub(super) fn check(&self) -> Result<(), SettingError> {
         let [low, high] = self.spacing_m;
-        for (field, x, most) in [
-            ("size_m", self.size_m, 1e3),
-            ("path_m", self.path_m, 1e5),
-            ("radius_m", self.radius_m, 0.25 * low),
-        ] {
+        for (field, x, most) in [("size_m", self.size_m, 1e3), ("path_m", self.path_m, 1e5)] {
             if !(x > 0.0 && x <= most) {
                 return Err(SettingError::value(field, x, format!("must be > 0 and <= {most}")));
             }
+        }
+        let (radius_m, least, most) = (self.radius_m, OBSTACLE_RADIUS_MIN_M, 0.25 * low);
+        if !(least..=most).contains(&radius_m) {
+            let must = format!("must be {least} to {most}");
+            return Err(SettingError::value("radius_m", radius_m, must));
         }
         if !(low >= 1.0 && low <= high && high.is_finite()) {
             let value = format!("[{low}, {high}]");
