@@ -47,6 +47,15 @@ struct Given {
     in_folder: bool,
 }
 
+impl Given {
+    /// Whether both are flights, of lists that prove something of each other.
+    fn is_to_be_apart_from(&self, other: &Self) -> bool {
+        let is_of_a_list =
+            |given: &Self| ["--flights", "--held-out", "--baseline"].contains(&given.argument);
+        self.argument != other.argument && is_of_a_list(self) && is_of_a_list(other)
+    }
+}
+
 impl Paths {
     /// Files that are read.
     pub(crate) fn reads<P: Into<PathBuf>>(
@@ -126,12 +135,19 @@ impl Paths {
     ///
     /// # Errors
     /// A result that would overwrite what is read, or another result; one that cannot be written,
-    /// which nobody wants to learn after the work.
+    /// which nobody wants to learn after the work; a flight of two lists.
     pub(crate) fn check(&self) -> Result<(), String> {
         let mut taken: BTreeMap<FileId, (&Given, &str)> = BTreeMap::new();
         for input in &self.reads {
-            let id = FileId::read(&input.path);
-            taken.extend(id.map(|id| (id, (input, "what is read is never overwritten"))));
+            let Some(id) = FileId::read(&input.path) else { continue };
+            let other = taken.insert(id, (input, "what is read is never overwritten"));
+            if let Some((other, _)) = other.filter(|(other, _)| input.is_to_be_apart_from(other)) {
+                let (path, its) = (input.path.display(), other.path.display());
+                return Err(format!(
+                    "{} {path}: is {} {its}; a flight proves nothing about itself",
+                    input.argument, other.argument
+                ));
+            }
         }
         for result in &self.writes {
             let Some(id) = FileId::written(&result.path) else { continue };

@@ -11,7 +11,7 @@
 //! flights tell of scatter.
 
 use crate::GapError;
-use crate::compatibility::{self, Gyroscope, Moments, Ready};
+use crate::compatibility::{self, Gyroscope, Known, Moments, Ready};
 use crate::fitted;
 use crate::leftover::usual;
 use crate::name::{BETA, Catalogue, Scatter, Scored, Search, hypothesis};
@@ -48,6 +48,8 @@ pub struct Baseline {
     pub set_aside: Vec<SetAside>,
     pub(crate) moments: Moments,
     pub(crate) scatter: Scatter,
+    /// A flight that is judged and one of these would show that nothing has changed.
+    pub(crate) known: Vec<Known>,
 }
 
 impl Baseline {
@@ -78,7 +80,7 @@ impl Baseline {
             Ok(ready) => {
                 let is_known = ready.gyroscope() == Gyroscope::Follows;
                 let moments = if is_known { Moments::All } else { Moments::Lasting };
-                (compatibility::problems(&ready, flights, &[])?, moments)
+                (compatibility::problems(&ready, &[], flights, &[])?, moments)
             }
             Err(error) => {
                 (compatibility::unreadable(vehicle, flights, &[], error)?, Moments::IfKnown)
@@ -101,8 +103,10 @@ impl Baseline {
         progress("fitting the baseline");
         own.effects = fitted::worth_a_line(&own, NEXT_TO_NOTHING);
         let scatter = scatter(&own, moments, &good)?;
+        let known = compatibility::known(good.iter());
         let flights = good.into_iter().map(|(name, _)| name).collect();
-        Ok(Self { declared: vehicle.clone(), vehicle: own, flights, set_aside, moments, scatter })
+        let declared = vehicle.clone();
+        Ok(Self { declared, vehicle: own, flights, set_aside, moments, scatter, known })
     }
 }
 

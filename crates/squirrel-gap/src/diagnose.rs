@@ -103,7 +103,8 @@ fn sorted<'a>(
         }
     };
     progress("checking the data");
-    let aside = compatibility::problems(&ready, flights, held_out)?;
+    let before = baseline.map_or(&[][..], |own| &own.known);
+    let aside = compatibility::problems(&ready, before, flights, held_out)?;
     let is_bad = |(name, _): &(String, FlightLog)| aside.iter().any(|a| a.flight == *name);
     if let Some(first) = aside.first().filter(|_| flights.iter().all(is_bad)) {
         let (goes_with, words) =

@@ -320,6 +320,30 @@ fn the_vehicle_file_is_never_overwritten() {
     assert_eq!(fs::read_to_string(folder.0.join("squirrel.toml")).unwrap(), SQUIRREL);
 }
 
+/// Known as one file before anything is read, by whatever path.
+#[test]
+fn a_flight_of_two_lists_is_refused() {
+    let folder = Folder::new("gap-two-lists");
+    write_vehicles(&folder);
+    fs::create_dir(folder.0.join("good")).unwrap();
+    folder.write("f.mcap", "is not read");
+    folder.write("h.mcap", "neither is this one");
+    fs::hard_link(folder.0.join("f.mcap"), folder.0.join("good/g.mcap")).unwrap();
+    for step in STEPS {
+        let gap = ["gap", step, "--vehicle", "squirrel.toml", "--out", "o", "--flights", "f.mcap"];
+        for (given, list) in [
+            (["--held-out", "f.mcap"], "--held-out f.mcap: is --flights f.mcap"),
+            (["--held-out", "./f.mcap"], "--held-out ./f.mcap: is --flights f.mcap"),
+            (["--baseline", "good"], "--baseline good/g.mcap: is --flights f.mcap"),
+        ] {
+            // Shrinking asks for them.
+            let more = if list.starts_with("--b") { &["--held-out", "h.mcap"][..] } else { &[] };
+            let words = [list, "a flight proves nothing about itself"];
+            folder.fails(&[&gap[..], more, &given[..]].concat(), &words);
+        }
+    }
+}
+
 /// A patched vehicle file beside a verdict is taken for a part of it.
 #[test]
 fn a_patch_of_before_does_not_stay_beside_a_verdict_without_one() {

@@ -104,7 +104,8 @@ impl Seen<'_> {
             }
         };
         progress("checking the data");
-        let aside = compatibility::problems(&ready, flights, held_out)?;
+        let before = self.own.map_or(&[][..], |own| &own.known);
+        let aside = compatibility::problems(&ready, before, flights, held_out)?;
         if !aside.is_empty() {
             return self.without(vehicle, flights, held_out, aside, progress);
         }

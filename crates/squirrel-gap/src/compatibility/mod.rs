@@ -25,6 +25,7 @@ use crate::verdict::{Kind, SetAside, Verdict};
 pub(crate) use channels::{channels, saturation};
 use flight::Flight;
 use pairs::{Pairs, Products};
+pub(crate) use repeated::{Known, known};
 use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -109,19 +110,22 @@ pub fn contradictions(
     vehicle: &VehicleFile,
     flights: &[(String, FlightLog)],
 ) -> Result<Vec<SetAside>, GapError> {
-    problems(&Ready::new(vehicle, flights, &[])?, flights, &[])
+    problems(&Ready::new(vehicle, flights, &[])?, &[], flights, &[])
 }
 
 /// The flights of both lists with a problem, each with its first.
+///
+/// * `before` - those of a baseline, which none of them may be
 ///
 /// # Errors
 /// What the predictor says.
 pub(crate) fn problems(
     ready: &Ready<'_>,
+    before: &[Known],
     flights: &[(String, FlightLog)],
     held_out: &[(String, FlightLog)],
 ) -> Result<Vec<SetAside>, GapError> {
-    let repeated = repeated::repeated(flights.iter().chain(held_out));
+    let repeated = repeated::repeated(before, flights.iter().chain(held_out));
     let mut found = problems_of(&ready.predictor, &ready.nominal, flights);
     if let Some(unseen) = &ready.unseen {
         found.extend(problems_of(unseen, &unseen.residual(&unseen.nominal())?, held_out));

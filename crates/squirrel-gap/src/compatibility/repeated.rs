@@ -6,12 +6,21 @@ use std::collections::HashMap;
 
 const CHANNEL: &str = "imu.specific_force_body_m_s2";
 
-/// The flights of the second list that repeat one of the first, or an earlier one of their own
-/// list.
+/// What a flight is known again by: its name, and its samples to the bit.
+pub(crate) type Known = (String, Vec<[u64; 6]>);
+
+/// What flights are known again by.
+pub(crate) fn known<'a>(flights: impl Iterator<Item = &'a (String, FlightLog)>) -> Vec<Known> {
+    flights.map(|(name, log)| (name.clone(), rows(log))).collect()
+}
+
+/// The flights that repeat an earlier one of their list, or one of those of before.
 pub(super) fn repeated<'a>(
+    before: &[Known],
     flights: impl Iterator<Item = &'a (String, FlightLog)>,
 ) -> Vec<SetAside> {
-    let all: Vec<(&String, Vec<[u64; 6]>)> = flights.map(|(name, log)| (name, rows(log))).collect();
+    let flights = known(flights);
+    let all: Vec<&Known> = before.iter().chain(&flights).collect();
     // The flights in which a row was until now.
     let mut holders: HashMap<&[u64; 6], Vec<usize>> = HashMap::new();
     let mut found: Vec<SetAside> = Vec::new();
@@ -28,13 +37,16 @@ pub(super) fn repeated<'a>(
                 flights.push(index);
             }
         }
-        let earlier = (0..index).filter(|i| found.iter().all(|aside| aside.flight != *all[*i].0));
+        if index < before.len() {
+            continue;
+        }
+        let earlier = (0..index).filter(|i| found.iter().all(|aside| aside.flight != all[*i].0));
         for (other, same) in earlier.map(|i| (i, same[i])).collect::<Vec<_>>() {
             // The shorter flight may lie in the longer one, whichever is given first.
             if 2 * same > own.len().min(all[other].1.len()) {
                 let share = 100.0 * same as f64 / own.len() as f64;
                 found.push(SetAside {
-                    flight: (*name).clone(),
+                    flight: name.clone(),
                     channel: CHANNEL,
                     words: format!(
                         "{name}: {CHANNEL}: {share:.0} % of its samples are those of {}; a flight proves nothing about itself",

@@ -173,6 +173,27 @@ fn a_good_flight_is_no_flight_to_judge() {
     assert_eq!(error.to_string(), "flight 1: two flights have this name");
 }
 
+/// Under whatever name: it would show that nothing has changed, as a fitted flight would prove
+/// itself.
+#[test]
+fn a_copy_of_a_good_flight_is_set_aside() {
+    let file = VehicleFile::squirrel();
+    let good = vec![fly_rich(&file, 1)];
+    let own = Baseline::fit(&file, &good, &|_| ()).unwrap();
+    let copy = ("copy".to_owned(), good[0].1.clone());
+    let words = "copy: imu.specific_force_body_m_s2: 100 % of its samples are those of flight 1";
+    let now = [copy.clone(), fly_rich(&file, 2)];
+    let check = check_since(&own, &now, &[], &|_| ()).unwrap();
+    assert_eq!(check.flights[0].usable_s, 0.0, "{}", check.words);
+    let alone = diagnose_since(&own, &now[..1], &now[1..], &|_| ()).unwrap().verdict;
+    assert_eq!(alone.verdict, Kind::DataProblem);
+    let held_out = diagnose_since(&own, &now[1..], &[copy], &|_| ()).unwrap().verdict;
+    for found in [alone, held_out] {
+        assert_eq!(found.set_aside.len(), 1, "{}", found.words);
+        assert!(found.set_aside[0].words.starts_with(words), "{}", found.set_aside[0].words);
+    }
+}
+
 /// A baseline that contradicts itself is one error with what is wrong, and a bad flight beside good
 /// ones is left out.
 #[test]
