@@ -75,8 +75,9 @@ struct Common {
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
     /// Stop as soon as every 95 % interval reaches at most so far to either side, in percent of the
-    /// figure, or in points where that is below 1; --trials is the most. Looks after 16 trials, 32
-    /// and so on, and leaves the bytes of a study of that many. Needs --out.
+    /// figure and with the sign, as 5%, or in points where that is below 1; --trials is the most.
+    /// Looks after 16 trials, 32 and so on, and leaves the bytes of a study of that many. Needs
+    /// --out.
     #[arg(long, value_name = "PERCENT")]
     until: Option<Until>,
 }

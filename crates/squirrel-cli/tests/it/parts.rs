@@ -66,4 +66,5 @@ fn a_stop_rule_that_cannot_be_is_one_line() {
     folder.fails(&["study", "forest", "--until", "5%"], &["--until: needs a folder", "--out"]);
     let wrong = folder.run(&["study", "forest", "--until", "5"]);
     assert_eq!(wrong.status.code(), Some(2));
+    assert!(folder.succeeds(&["study", "forest", "--help"]).contains("with the sign, as 5%"));
 }
