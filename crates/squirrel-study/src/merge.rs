@@ -33,16 +33,14 @@ pub fn merge(folders: &[PathBuf], into: &Path) -> Result<Vec<String>, FlightErro
             let Some(head) = head else { return Err(at("holds nothing".to_owned())) };
             let (first, merged) = all.entry(name).or_insert_with(|| (head.clone(), Lines::new()));
             if *first != head {
-                return Err(at(format!(
-                    "is of another plan ({}) than the first ({})",
-                    head.plan, first.plan
-                )));
+                return Err(at(format!("is {} the first", differs(&head, first))));
             }
             let command = command.get_or_insert_with(|| head.command.clone());
             if *command != head.command {
                 return Err(at(format!(
-                    "is of another study ({}) than the first",
-                    head.command.join(" ")
+                    "is of another study ({}) than the first ({})",
+                    head.command.join(" "),
+                    command.join(" ")
                 )));
             }
             for (trial, line) in lines {
@@ -61,8 +59,10 @@ pub fn merge(folders: &[PathBuf], into: &Path) -> Result<Vec<String>, FlightErro
         if let Some(there) = there
             && there != *head
         {
-            let problem =
-                format!("is of another plan ({}); give another --out, or delete it", there.plan);
+            let problem = format!(
+                "is {} the merged parts; give another --out, or delete it",
+                differs(&there, head)
+            );
             return Err(FlightError(format!("{}: {problem}", path.display())));
         }
         // What an earlier merge brought stays.
@@ -72,6 +72,19 @@ pub fn merge(folders: &[PathBuf], into: &Path) -> Result<Vec<String>, FlightErro
     command.filter(|command| !command.is_empty()).ok_or_else(|| {
         FlightError("merge: the folders do not say which study they hold a part of".to_owned())
     })
+}
+
+/// What a journal is of that another one is not of, up to the words that say which.
+fn differs(own: &Head, other: &Head) -> String {
+    if own.plan != other.plan {
+        return format!("of another plan ({}) than that ({}) of", own.plan, other.plan);
+    }
+    let only = |a: &Head, b: &Head| {
+        let words: Vec<&str> =
+            a.command.iter().filter(|word| !b.command.contains(word)).map(String::as_str).collect();
+        if words.is_empty() { "nothing more".to_owned() } else { words.join(" ") }
+    };
+    format!("flown with {} instead of {} of", only(own, other), only(other, own))
 }
 
 /// The names of a folder's journals.

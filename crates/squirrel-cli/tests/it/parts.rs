@@ -1,6 +1,6 @@
 //! Studies that were flown in parts, or stopped by themselves, have the bytes of those in one go.
 
-use crate::support::Folder;
+use crate::support::{Folder, SQUIRREL};
 use std::fs;
 
 const FILES: [&str; 4] = ["forest.csv", "forest.json", "forest.html", "forest.trials.jsonl"];
@@ -67,4 +67,22 @@ fn a_stop_rule_that_cannot_be_is_one_line() {
     let wrong = folder.run(&["study", "forest", "--until", "5"]);
     assert_eq!(wrong.status.code(), Some(2));
     assert!(folder.succeeds(&["study", "forest", "--help"]).contains("with the sign, as 5%"));
+}
+
+#[test]
+fn what_parts_differ_in_is_said() {
+    let folder = Folder::new("parts-differ");
+    for (out, shard, trials) in [("a", "1/2", "2"), ("b", "2/2", "2"), ("c", "2/2", "3")] {
+        folder.succeeds(&[&STUDY[..], &[out, "--trials", trials, "--shard", shard]].concat());
+    }
+    folder.fails(
+        &["study", "merge", "a", "c", "--out", "new"],
+        &["c/forest.trials.jsonl: is flown with --trials=3 instead of --trials=2 of the first"],
+    );
+    folder.write("v.toml", &SQUIRREL.replacen("0.548", "0.549", 1));
+    let merge = ["study", "merge", "a", "b", "--out", "new"];
+    let output = folder.run(&[&merge[..], &["--vehicle", "v.toml"]].concat());
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(stderr.contains("--vehicle must be what they were flown with"), "{stderr}");
+    assert!(!stderr.contains("new"), "what is not there is not to blame: {stderr}");
 }
