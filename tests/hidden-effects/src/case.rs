@@ -10,8 +10,8 @@ use crate::outside::Outside;
 use crate::overstate::{Overstatement, Stated};
 use crate::poor::Poor;
 use crate::recorder::{Capture, Estimator, Recorder, SensorFault};
+use crate::set::forms;
 pub use crate::set::{Generator, Set};
-use crate::set::{LOAD, forms};
 use crate::squirrel_made;
 use serde::{Deserialize, Serialize};
 use squirrel_log::{FlightLog, LogError};
@@ -194,9 +194,6 @@ impl Case {
             _ => {}
         }
         let mut case = Self { answer, nominal, seed };
-        if case.about().any(|name| name == LOAD) {
-            case.answer.excitation = Excitation::Calm;
-        }
         let mut draw = Draw::new(mix(seed, 5));
         // Some say no more of their propellers than most files do.
         if case.about().any(|name| name == BLOWN) && draw.uniform(0.0, 1.0) < DETAILED {

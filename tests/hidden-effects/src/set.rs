@@ -151,8 +151,8 @@ impl Set {
     }
 }
 
-/// Flown by itself and calmly: dashes that show other effects swing it up to the horizontal, where
-/// nobody flies a load and nothing of its swing can be foreseen.
+/// Flown by itself: dashes that show other effects swing it up to the horizontal, where nobody flies
+/// a load and nothing of its swing can be foreseen.
 pub(crate) const LOAD: &str = "payload_swing";
 
 /// What position and attitude from outside, commands and voltage can show. Slow forces: drag, wind,
