@@ -151,10 +151,13 @@ pub(crate) fn decide(
             && search.is_plausible(&found.best)
             && shrinks
         {
-            match (has_motion, close.is_empty()) {
-                (true, true) => Kind::NamedFormDiffers,
+            // Of names that leave something, the one with the most evidence may be another.
+            let own = search.weighed(&found.best);
+            let leads = close.iter().all(|set| search.weighed(set) <= own);
+            match (has_motion && leads, close.is_empty()) {
+                (true, _) => Kind::NamedFormDiffers,
                 (false, true) => Kind::NamedIncomplete,
-                (_, false) => Kind::Ambiguous,
+                (false, false) => Kind::Ambiguous,
             }
         } else if naming.stands {
             Kind::Ambiguous

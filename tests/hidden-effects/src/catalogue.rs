@@ -8,7 +8,6 @@ use crate::independent::twins::{
     Equation, angular_damping, flapping_moment, rotor_wash, vortex_ring, wing_moment,
     wing_tangential,
 };
-use crate::set::LOAD;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -270,13 +269,14 @@ pub const CATALOGUE: &[Entry] = &[
 
 /// Pairs of different kinds that flights tell apart only by the tolerances, or where one hides the
 /// other's only sign.
-const CONFOUNDED: [[&str; 2]; 7] = [
+const CONFOUNDED: [[&str; 2]; 8] = [
     ["weak_rotor", "cg_offset"],
     ["inertia_error", "yaw_torque_coeff"],
     ["inertia_error", "thrust_coefficient"],
     ["inertia_error", "mass_error"],
     ["accel_bias", "thrust_misalignment"],
     ["heading_bias", "constant_wind"],
+    ["payload_swing", "mass_error"],
     ["axial_inflow", "wing_membrane"],
 ];
 
@@ -372,11 +372,7 @@ impl Entry {
     /// Whether both can be told from flights that hide the two of them.
     pub fn goes_with(&self, other: &Entry) -> bool {
         let confounded = |pair: &[&str; 2]| pair.contains(&self.name) && pair.contains(&other.name);
-        let is_load = |entry: &Entry| entry.name == LOAD;
-        self.kind != other.kind
-            && !CONFOUNDED.iter().any(confounded)
-            && !is_load(self)
-            && !is_load(other)
+        self.kind != other.kind && !CONFOUNDED.iter().any(confounded)
     }
 }
 

@@ -145,7 +145,6 @@ impl Set {
             // Gusts have no size that a file could state too large: what blows on one day is not
             // what blows on another.
             Self::Overstated => CATALOGUE.iter().filter(|entry| entry.name != "gust").collect(),
-            Self::Two => CATALOGUE.iter().filter(|entry| entry.name != LOAD).collect(),
             _ => CATALOGUE.iter().collect(),
         }
     }

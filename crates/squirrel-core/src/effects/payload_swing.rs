@@ -4,8 +4,9 @@
 //! A spherical pendulum on a pivot whose acceleration is `a`: `r = l u` is the load's place from the
 //! vehicle, `s` its horizontal part. A load that is lifted quicker weighs more, one that swings far
 //! swings slower and pulls more below than at its turns. Damping `c = 0.1 1/s`, in the form `damped`
-//! a parameter. The tether is fixed at the centre of mass; it also pushes, where a real one would
-//! hang loose, and stays below the horizontal. A length of 0 is no load.
+//! a parameter. The tether is fixed at the centre of mass and pulls, or hangs loose; it stays a
+//! little below the horizontal, and a log that says otherwise than any flight leaves it finite. A
+//! length of 0 is no load.
 
 use super::{Effect, EffectParameter, Fitted, Response, Scale, Shown, Tolerance, Words, is};
 use crate::lane::Lane;
@@ -18,6 +19,8 @@ const DAMPED: usize = 1;
 const BELOW_MIN: f64 = 0.15;
 /// Half a step from which on the middle of a step says nothing, s.
 const HALF_MAX_S: f64 = 0.02;
+/// Tension over the load's mass, at most, m/s^2: nine times its weight.
+const TENSION_MAX_M_S2: f64 = 9.0 * GRAVITY_M_S2;
 
 /// Mass and tether of the load.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,7 +101,8 @@ impl<L: Lane> Tether<L> {
     pub fn tension_m_s2(&self, acceleration: &[L; 3]) -> L {
         let [north, east, down] = *acceleration;
         let falling = [north, east, down - L::of(GRAVITY_M_S2)];
-        self.circling_m_s2 - dot(&self.along, &falling)
+        let tension = self.circling_m_s2 - dot(&self.along, &falling);
+        tension.upper(L::of(0.0)).lower(L::of(TENSION_MAX_M_S2))
     }
 
     /// Its pull on the vehicle, world frame, N.
@@ -111,8 +115,8 @@ impl<L: Lane> Tether<L> {
     #[inline(always)]
     pub fn force(&self, force: &[L; 3], inverse_mass: L) -> [L; 3] {
         let both = L::of(1.0) + self.mass_kg * inverse_mass;
-        let apart_m_s2 = self.circling_m_s2 - dot(&self.along, force) * inverse_mass;
-        scaled(&self.along, self.mass_kg * apart_m_s2 / both)
+        let tension = (self.circling_m_s2 - dot(&self.along, force) * inverse_mass) / both;
+        scaled(&self.along, self.mass_kg * tension.upper(L::of(0.0)).lower(L::of(TENSION_MAX_M_S2)))
     }
 }
 
@@ -170,7 +174,10 @@ impl<L: Lane> Swing<L> {
     pub fn tether(&self, state: &PendulumState<L>) -> Tether<L> {
         let ([north, east], [u, v]) = (state.offset_m, state.velocity_m_s);
         let (x, y) = (north * self.per_length, east * self.per_length);
-        let below = (L::of(1.0) - (x * x + y * y)).upper(L::of(BELOW_MIN * BELOW_MIN)).root();
+        let widest = L::of(1.0 - BELOW_MIN * BELOW_MIN);
+        let within = (widest / (x * x + y * y).upper(widest)).root();
+        let (x, y) = (x * within, y * within);
+        let below = (L::of(1.0) - (x * x + y * y)).root();
         let sinking = (x * u + y * v) / below;
         let circling_m_s2 = (u * u + v * v + sinking * sinking) * self.per_length;
         Tether { mass_kg: self.mass_kg, along: [x, y, below], circling_m_s2 }

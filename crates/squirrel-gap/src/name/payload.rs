@@ -4,11 +4,14 @@
 //! Over a flight of 40 s two swings 0.03 Hz apart have nothing in common, so that a hypothesis must
 //! start near the right length; and one that swings far swings slower, so that a line of the
 //! residual is not its length. What a load pulls over its mass needs nothing but the vehicle's
-//! measured acceleration.
+//! measured acceleration. Where none explains much of the residual, the lines are looked at after
+//! all, `f = sqrt(g / l) / 2 pi`: it may be one thing of several, or nothing.
 
 use crate::predictor::{DYNAMIC, Predictor};
 use nalgebra::Vector3;
 use squirrel_core::effects::{Pendulum, PendulumState};
+use squirrel_core::math::GRAVITY_M_S2;
+use std::f64::consts::TAU;
 
 /// Lengths of a tether, m, and how far apart they are looked at.
 const LENGTHS_M: (f64, f64) = (0.22, 1.1);
@@ -17,17 +20,23 @@ const STEP: f64 = 0.015;
 const DAMPING_PER_S: f64 = 0.1;
 /// Lengths closer than this part are one.
 const APART: f64 = 0.06;
+/// Part of the residual that a load must explain.
+const MUCH: f64 = 0.15;
+/// Lines of the residual, Hz: how far apart they are looked at, and closer than what they are one.
+const STEP_HZ: f64 = 0.005;
+const APART_HZ: f64 = 0.03;
 /// Lengths to look at.
 const LINES: usize = 3;
 /// Time between two accelerations at least, s.
 const STEP_S: f64 = 0.007;
 
-/// A piece of a flight: the vehicle's accelerations, time between them, and the horizontal residual
-/// with the acceleration that it is at; world frame, m/s^2.
+/// A piece of a flight: the vehicle's accelerations, and the horizontal residual with the
+/// acceleration that it is at; world frame, m/s^2, with the times between them, s.
 struct Piece {
     accelerations: Vec<Vector3<f64>>,
     step_s: f64,
     residual: Vec<(usize, [f64; 2])>,
+    residual_step_s: f64,
 }
 
 /// Lengths, m, of loads that pull as the horizontal residual does, the likest first; of a vehicle
@@ -48,6 +57,11 @@ pub(crate) fn payload_lengths_m(predictor: &Predictor, rows: &[f64]) -> Vec<f64>
         .map(|length_m| (likeness(&pieces, length_m), length_m))
         .collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    if all.first().is_none_or(|(share, _)| *share < MUCH) {
+        let hz = |length_m: f64| (GRAVITY_M_S2 / length_m).sqrt() / TAU;
+        let lines = lines_hz(&pieces, hz(most), hz(least));
+        return lines.iter().map(|f| GRAVITY_M_S2 / (TAU * f).powi(2)).collect();
+    }
     let mut chosen: Vec<f64> = Vec::new();
     for (_, length_m) in all {
         if chosen.len() < LINES && chosen.iter().all(|m| (m / length_m).ln().abs() >= APART) {
@@ -57,16 +71,44 @@ pub(crate) fn payload_lengths_m(predictor: &Predictor, rows: &[f64]) -> Vec<f64>
     chosen
 }
 
-/// What a load of a length explains of the residual, (m/s^2)^2.
+/// The strongest lines of the residual between two frequencies, Hz, the strongest first.
+fn lines_hz(pieces: &[Piece], least_hz: f64, most_hz: f64) -> Vec<f64> {
+    let count = ((most_hz - least_hz) / STEP_HZ) as usize;
+    let frequency_hz = |i: usize| least_hz + i as f64 * STEP_HZ;
+    let mut power = vec![0.0; count];
+    for piece in pieces {
+        for axis in 0..2 {
+            for (i, power) in power.iter_mut().enumerate() {
+                let w = TAU * frequency_hz(i) * piece.residual_step_s;
+                let (mut a, mut b) = (0.0, 0.0);
+                for (_, value) in &piece.residual {
+                    (a, b) = (value[axis] + 2.0 * w.cos() * a - b, a);
+                }
+                *power += a * a + b * b - 2.0 * w.cos() * a * b;
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
+    let mut chosen: Vec<f64> = Vec::new();
+    for i in order {
+        if chosen.len() < LINES && chosen.iter().all(|f| (f - frequency_hz(i)).abs() >= APART_HZ) {
+            chosen.push(frequency_hz(i));
+        }
+    }
+    chosen
+}
+
+/// Part of the residual that a load of a length explains.
 fn likeness(pieces: &[Piece], length_m: f64) -> f64 {
     let load = Pendulum { mass_kg: 1.0, length_m, damping_per_s: DAMPING_PER_S };
-    let (mut along, mut square) = (0.0, 0.0);
+    let (mut along, mut square, mut whole) = (0.0, 0.0, 0.0);
     for piece in pieces {
         let swing = load.over(piece.step_s);
         let mut state = PendulumState::at_rest();
         let mut residual = piece.residual.iter().peekable();
-        // Mean of the pull, of the residual, of both and of the pull's square, by axis.
-        let mut sums = [[0.0; 4]; 2];
+        // Sums of the pull, the residual, both, and the squares of either, by axis.
+        let mut sums = [[0.0; 5]; 2];
         for (k, acceleration) in piece.accelerations.iter().enumerate() {
             let acceleration = [acceleration.x, acceleration.y, acceleration.z];
             swing.lead(&mut state, acceleration);
@@ -75,19 +117,20 @@ fn likeness(pieces: &[Piece], length_m: f64) -> f64 {
             let tension = tether.tension_m_s2(&acceleration);
             for axis in 0..2 {
                 let (pull, left) = (tension * tether.along[axis], left[axis]);
-                let [p, r, both, own] = &mut sums[axis];
-                (*p, *r, *both, *own) =
-                    (*p + pull, *r + left, *both + pull * left, *own + pull * pull);
+                let [p, r, both, own, other] = &mut sums[axis];
+                (*p, *r, *both) = (*p + pull, *r + left, *both + pull * left);
+                (*own, *other) = (*own + pull * pull, *other + left * left);
             }
         }
         let n = piece.residual.len() as f64;
-        for [p, r, both, own] in sums {
+        for [p, r, both, own, other] in sums {
             along += both - p * r / n;
             square += own - p * p / n;
+            whole += other - r * r / n;
         }
     }
     // A load pulls to where it hangs.
-    if along > 0.0 && square > 0.0 { along * along / square } else { 0.0 }
+    if along > 0.0 && square * whole > 0.0 { along * along / (square * whole) } else { 0.0 }
 }
 
 impl Piece {
@@ -119,6 +162,6 @@ impl Piece {
             })
             .collect::<Vec<_>>();
         let is_long = residual.len() > 30 && accelerations.len() > 30;
-        is_long.then_some(Self { accelerations, step_s, residual })
+        is_long.then_some(Self { accelerations, step_s, residual, residual_step_s: x.step_s })
     }
 }
