@@ -151,10 +151,7 @@ pub(crate) fn decide(
             && search.is_plausible(&found.best)
             && shrinks
         {
-            // Of names that leave something, the one with the most evidence may be another.
-            let own = search.weighed(&found.best);
-            let leads = close.iter().all(|set| search.weighed(set) <= own);
-            match (has_motion && leads, close.is_empty()) {
+            match (has_motion, close.is_empty()) {
                 (true, _) => Kind::NamedFormDiffers,
                 (false, true) => Kind::NamedIncomplete,
                 (false, false) => Kind::Ambiguous,
