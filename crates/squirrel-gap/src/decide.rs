@@ -173,9 +173,7 @@ pub(crate) fn decide(
     };
     let is_named = matches!(kind, Kind::Named | Kind::NamedIncomplete | Kind::NamedFormDiffers);
     let mut moved = search.moved(&found.best);
-    if effects.is_empty() {
-        moved.retain(|number| number.far() >= UNNAMED);
-    }
+    moved.retain(|number| !effects.is_empty() || number.far() >= UNNAMED);
     let kind = match (is_named && is_doubtful(search, naming, &moved), rivals.is_empty()) {
         (false, _) => kind,
         (true, true) => Kind::OutsideCatalogue,

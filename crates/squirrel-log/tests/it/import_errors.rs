@@ -74,11 +74,9 @@ fn text_of_two_bytes_a_letter_is_told_as_such() {
 
 #[test]
 fn a_rate_that_no_log_has_is_told_with_the_unit_of_time() {
-    let rows = |step: f64| -> String {
-        (0..5).map(|i| format!("{},{i},2,3\n", f64::from(i) * step)).collect()
-    };
-    let notes = |step| {
-        let csv = format!("t,x,y,z\n{}", rows(step));
+    let notes = |step: f64| {
+        let rows = (0..5).map(|i| format!("{},{i},2,3", f64::from(i) * step));
+        let csv = ["t,x,y,z".to_owned()].into_iter().chain(rows).collect::<Vec<_>>().join("\n");
         let flight = Flight::new("rate", &[("f.csv", &csv)]);
         flight.import_file(&one_source(OMEGA)).unwrap().1.notes
     };
