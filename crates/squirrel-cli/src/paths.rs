@@ -45,14 +45,17 @@ struct Given {
     path: PathBuf,
     /// In a folder that the command makes, or in one in it.
     in_folder: bool,
+    is_flight: bool,
 }
 
 impl Given {
-    /// Whether both are flights, of lists that prove something of each other.
+    fn new(argument: &'static str, path: impl Into<PathBuf>) -> Self {
+        Self { argument, path: path.into(), in_folder: false, is_flight: false }
+    }
+
+    /// Whether both are flights of lists of their own, which prove something of each other.
     fn is_to_be_apart_from(&self, other: &Self) -> bool {
-        let is_of_a_list =
-            |given: &Self| ["--flights", "--held-out", "--baseline"].contains(&given.argument);
-        self.argument != other.argument && is_of_a_list(self) && is_of_a_list(other)
+        self.is_flight && other.is_flight && self.argument != other.argument
     }
 }
 
@@ -63,8 +66,7 @@ impl Paths {
         argument: &'static str,
         paths: impl IntoIterator<Item = P>,
     ) -> Self {
-        let given = |path: P| Given { argument, path: path.into(), in_folder: false };
-        self.reads.extend(paths.into_iter().map(given));
+        self.reads.extend(paths.into_iter().map(|path| Given::new(argument, path)));
         self
     }
 
@@ -94,8 +96,14 @@ impl Paths {
     ///
     /// # Errors
     /// A folder that cannot be read, or that holds none.
-    pub(crate) fn flights(self, argument: &'static str, paths: &[PathBuf]) -> Result<Self, String> {
-        Ok(self.reads(argument, log_files(paths)?))
+    pub(crate) fn flights(
+        mut self,
+        argument: &'static str,
+        paths: &[PathBuf],
+    ) -> Result<Self, String> {
+        let flight = |path| Given { is_flight: true, ..Given::new(argument, path) };
+        self.reads.extend(log_files(paths)?.into_iter().map(flight));
+        Ok(self)
     }
 
     /// Files that are written.
@@ -104,8 +112,7 @@ impl Paths {
         argument: &'static str,
         paths: impl IntoIterator<Item = &'a PathBuf>,
     ) -> Self {
-        let given = |path: &PathBuf| Given { argument, path: path.clone(), in_folder: false };
-        self.writes.extend(paths.into_iter().map(given));
+        self.writes.extend(paths.into_iter().map(|path| Given::new(argument, path)));
         self
     }
 
@@ -125,7 +132,7 @@ impl Paths {
         folder: &Path,
         names: impl IntoIterator<Item = N>,
     ) -> Self {
-        let given = |name: N| Given { argument: "--out", path: folder.join(name), in_folder: true };
+        let given = |name: N| Given { in_folder: true, ..Given::new("--out", folder.join(name)) };
         self.writes.extend(names.into_iter().map(given));
         self.makes.extend(FileId::read(folder));
         self

@@ -17,6 +17,7 @@ pub use runs::RunsTable;
 pub use wind::WindTable;
 
 use crate::plant::WindParameters;
+use crate::world::OBSTACLE_RADIUS_MIN_M;
 use serde::{Deserialize, Serialize};
 use squirrel_core::frames::In;
 use squirrel_core::guidance::mission::{Mission, Steering, TurnSide};
@@ -124,9 +125,6 @@ pub enum MissionTable {
     /// Random runs with spread wings.
     Runs(RunsTable),
 }
-
-/// Thinner ones are nothing that a vehicle could hit: the world has none, m.
-const OBSTACLE_RADIUS_MIN_M: f64 = 1e-3;
 
 /// Names of the built-in scenarios.
 pub const BUILT_IN: [&str; 9] = [

@@ -269,14 +269,14 @@ impl<'a> Journal<'a> {
         let at = |e: &dyn std::fmt::Display| FlightError(format!("{}: {e}", path.display()));
         let (before, done, mut length) = read(&path)?;
         if let Some(before) = before {
-            if before.plan != plan && keep.part == Part::Merged {
-                // The folder is the merge's own; what differs is what it was asked for.
-                return Err(FlightError(format!(
-                    "merge: the parts are of another plan ({}) than this one ({plan}); --vehicle must be what they were flown with",
-                    before.plan
-                )));
-            }
             if before.plan != plan {
+                if keep.part == Part::Merged {
+                    // The folder is the merge's own; what differs is what it was asked for.
+                    return Err(FlightError(format!(
+                        "merge: the parts are of another plan ({}) than this one ({plan}); --vehicle must be what they were flown with",
+                        before.plan
+                    )));
+                }
                 let problem = format!(
                     "is of another plan ({}); give another --out, or delete it",
                     before.plan

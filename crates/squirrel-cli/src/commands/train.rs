@@ -118,7 +118,7 @@ impl Train {
         } else {
             new(self.model).map_err(fail)?
         };
-        let kept = train(&mut trainer, checkpoint.as_deref())?;
+        train(&mut trainer, checkpoint.as_deref())?;
 
         let plate = new(Model::FlatPlate).map_err(fail)?.best();
         let mut best = trainer.best();
@@ -128,8 +128,8 @@ impl Train {
         }
         best.card.figures = figures(&sets);
         best.save(&self.out).map_err(fail)?;
-        // What is left of the way is no longer needed; a file of somebody else is none of it.
-        let _ = checkpoint.filter(|_| self.resume || kept).map(std::fs::remove_file);
+        // What is left of the way is no longer needed. None was there before but what this resumed.
+        let _ = checkpoint.map(std::fs::remove_file);
 
         say(&format!("{} of {}, seed {}\n", self.model.name(), vehicle.name, self.seed));
         let table = table(&sets);
@@ -223,12 +223,11 @@ impl Train {
     }
 }
 
-/// All epochs that are left, with a checkpoint every now and then; whether one was written.
-fn train(trainer: &mut Trainer, checkpoint: Option<&Path>) -> Result<bool, String> {
+/// All epochs that are left, with a checkpoint every now and then.
+fn train(trainer: &mut Trainer, checkpoint: Option<&Path>) -> Result<(), String> {
     let fail = |e: NnError| e.to_string();
     let bar = output::progress(trainer.settings().epochs as u64, "epochs");
     bar.set_position(trainer.history().len() as u64);
-    let mut kept = false;
     while let Some(epoch) = trainer.epoch().map_err(fail)? {
         bar.set_message(format!("{:.4} N", epoch.validation.unwrap_or(epoch.training).sqrt()));
         bar.inc(1);
@@ -237,11 +236,10 @@ fn train(trainer: &mut Trainer, checkpoint: Option<&Path>) -> Result<bool, Strin
             && let Some(checkpoint) = checkpoint
         {
             trainer.save(checkpoint).map_err(fail)?;
-            kept = true;
         }
     }
     bar.finish_and_clear();
-    Ok(kept)
+    Ok(())
 }
 
 fn judge(set: &'static str, trained: &Trained, plate: &Trained, windows: &Windows) -> Judged {

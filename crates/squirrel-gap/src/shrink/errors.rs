@@ -43,9 +43,8 @@ impl Errors12 {
     }
     /// Adds one comparison, if it is one: a plant that has run away has none.
     pub(super) fn add(&mut self, bin: usize, parts: [Vector3<f64>; 4]) {
-        let error = Errors::from_iterator(parts.iter().flat_map(|part| part.iter().copied()));
-        if error.iter().all(|x| x.is_finite()) {
-            self.squared[bin] += error.component_mul(&error);
+        if parts.iter().flatten().all(|x| x.is_finite()) {
+            self.squared[bin] += squares(&parts);
             self.count[bin] += 1.0;
         }
     }
@@ -90,6 +89,13 @@ impl Floor {
             .sup(&lucky)
     }
 }
+
+/// Squares of the parts of a comparison, channel by channel.
+pub(super) fn squares(parts: &[Vector3<f64>; 4]) -> Errors {
+    let error = Errors::from_iterator(parts.iter().flat_map(|part| part.iter().copied()));
+    error.component_mul(&error)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

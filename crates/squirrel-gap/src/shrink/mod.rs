@@ -26,16 +26,17 @@ pub(crate) use segments::BIN_S;
 
 use crate::GapError;
 use crate::predictor::{Hypothesis, Predictor};
-use errors::{COUNTED, Errors};
+use errors::{COUNTED, Errors, squares};
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
-use segments::{Bin, Segments, compared};
+use segments::{Bin, Noise, Segments, compared};
 
 /// Flights of noise that the floor is the mean of, each of every other segment: half of what one
 /// says its neighbours say, too.
 const DRAWS: usize = 3;
+
 /// A hypothesis on flights, flown without noise: its errors and its floor are both told from that.
 pub(crate) struct Flown<'a> {
     pieces: Vec<(Segments<'a>, Vec<Bin>)>,
@@ -118,10 +119,7 @@ impl<'a> Flown<'a> {
                         segments.push(Errors::zeros());
                     }
                     if let Some(segment) = segments.last_mut().filter(|_| blown.number < COUNTED) {
-                        let error = Errors::from_iterator(
-                            parts.iter().flat_map(|part| part.iter().copied()),
-                        );
-                        *segment += error.component_mul(&error) / COUNTED as f64;
+                        *segment += squares(&parts) / COUNTED as f64;
                     }
                     all.add(blown.number, parts);
                 });
@@ -136,15 +134,6 @@ impl<'a> Flown<'a> {
         let deviation = (square * (2.0 / flown.max(1) as f64)).map(f64::sqrt);
         Floor { mean: all, deviation }
     }
-}
-/// What a flight is blown about with, and what its start states are off by.
-struct Noise<'a> {
-    /// Of each segment: wind, velocity, attitude and rate, in units of their deviation.
-    starts: std::vec::IntoIter<[Vector3<f64>; 4]>,
-    turbulence_m_s: f64,
-    velocity_m_s: Vector3<f64>,
-    attitude_rad: Vector3<f64>,
-    rng: &'a mut Pcg64Mcg,
 }
 
 /// What so many segments start with. Each number has the mean square of as many as one likes, so

@@ -1,13 +1,13 @@
 //! The plant put where the vehicle was measured to be, flown under the logged commands, and what the
 //! sensors should then read.
 
-use super::Noise;
 use super::errors::{BINS, COUNTED, Errors12};
 use crate::GapError;
 use crate::leftover::floor::TURBULENCE_S;
 use crate::predictor::{Clock, Hypothesis, Motion, Predictor, Track};
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64Mcg;
 use squirrel_core::frames::In;
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_sim::plant::{Plant, PlantState};
@@ -27,6 +27,16 @@ const START_NOISE: f64 = 0.505;
 /// Shortest and longest step of the plant, s: commands are its means, and it is no longer than the
 /// lag of the rotors that they move.
 const STEP_S: (f64, f64) = (0.0001, 0.0036);
+
+/// What a flight is blown about with, and what its start states are off by.
+pub(super) struct Noise<'a> {
+    /// Of each segment: wind, velocity, attitude and rate, in units of their deviation.
+    pub(super) starts: std::vec::IntoIter<[Vector3<f64>; 4]>,
+    pub(super) turbulence_m_s: f64,
+    pub(super) velocity_m_s: Vector3<f64>,
+    pub(super) attitude_rad: Vector3<f64>,
+    pub(super) rng: &'a mut Pcg64Mcg,
+}
 
 /// What a plant reads in one bin.
 pub(super) struct Reading {

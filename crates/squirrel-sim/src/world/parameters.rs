@@ -5,6 +5,9 @@ use squirrel_core::vehicle::ParameterError;
 /// Most obstacles of a world.
 pub const MAX_OBSTACLES: usize = 10_000;
 
+/// Thinner ones are nothing that a vehicle could hit, m.
+pub const OBSTACLE_RADIUS_MIN_M: f64 = 1e-3;
+
 /// Top restitution. Above it the impacts of a fast tumble give back more energy than they took:
 /// measured over 300 such flights, 12 % more with 0.8 at a step of 4 ms.
 pub const RESTITUTION_MAX: f64 = 0.5;
@@ -100,7 +103,7 @@ pub(super) fn check(p: &WorldParameters) -> Result<(), ParameterError> {
             "obstacles[].radius_m",
             Some(i),
             c.radius_m,
-            [1e-3, 1e3],
+            [OBSTACLE_RADIUS_MIN_M, 1e3],
             "must be 0.001 to 1000 m",
         )?;
         within(

@@ -223,15 +223,18 @@ fn numbers(page: &mut Page, study: &Forest) {
         let counts = share(of.in_band).into_iter().chain(share(of.through));
         row(of.arm, counts.chain(over).chain(means))
     };
-    page.table(&head(&names), &study.rows.iter().map(cells).collect::<Vec<_>>());
+    let table = |page: &mut Page, rows: &[Row]| {
+        page.table(&head(&names), &rows.iter().map(cells).collect::<Vec<_>>());
+    };
+    table(page, &study.rows);
     page.section(
         "With a limit of speed for all",
         "The same flights, with the limit of speed that ours has for the paper's laws too: what of the difference is that limit.",
     );
-    page.table(&head(&names), &study.limited.iter().map(cells).collect::<Vec<_>>());
+    table(page, &study.limited);
     page.section(
         "Turning away from the trunk",
         "The same flights with that limit, each turn to the side without the trunk instead of to one that was drawn.",
     );
-    page.table(&head(&names), &study.away.iter().map(cells).collect::<Vec<_>>());
+    table(page, &study.away);
 }

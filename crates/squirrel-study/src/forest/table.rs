@@ -37,17 +37,32 @@ fn fly(plan: &Plan, options: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, F
     found.say(format!(
         "Through: 400 m without contact; in band: and never {BAND_M} m above or below. Wilson's 95 % intervals, in %."
     ));
-    found.say(
-        "Over phantom: in band, less that of the controller without wings on the same trials, in points.\n",
-    );
-    let mut csv = found.sheet(sheet(&study.rows, "as it is", "drawn"));
-    found.say("\nThe same, with the limit of speed that ours has for the paper's laws too.\n");
-    let limited = found.sheet(sheet(&study.limited, "limited", "drawn"));
-    csv.extend(limited.split_inclusive('\n').skip(1));
-    found.say("\nThe same with that limit, turning away from the trunk instead of to a side that was drawn.\n");
-    let away = found.sheet(sheet(&study.away, "limited", "away"));
-    csv.extend(away.split_inclusive('\n').skip(1));
-    found.csv = csv;
+    for (words, rows, speed, side) in [
+        (
+            "Over phantom: in band, less that of the controller without wings on the same trials, in points.\n",
+            &study.rows,
+            "as it is",
+            "drawn",
+        ),
+        (
+            "\nThe same, with the limit of speed that ours has for the paper's laws too.\n",
+            &study.limited,
+            "limited",
+            "drawn",
+        ),
+        (
+            "\nThe same with that limit, turning away from the trunk instead of to a side that was drawn.\n",
+            &study.away,
+            "limited",
+            "away",
+        ),
+    ] {
+        found.say(words);
+        let table = found.sheet(sheet(rows, speed, side));
+        // One heading for all.
+        let heading = usize::from(!found.csv.is_empty());
+        found.csv.extend(table.split_inclusive('\n').skip(heading));
+    }
     found.words(words(&study));
     if keep.folder.is_some() {
         found.page = Some(page(&study, plan)?);
