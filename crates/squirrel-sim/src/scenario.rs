@@ -17,7 +17,6 @@ pub use runs::RunsTable;
 pub use wind::WindTable;
 
 use crate::plant::WindParameters;
-use crate::world::OBSTACLE_RADIUS_MIN_M;
 use serde::{Deserialize, Serialize};
 use squirrel_core::frames::In;
 use squirrel_core::guidance::mission::{Mission, Steering, TurnSide};
@@ -29,6 +28,10 @@ use squirrel_core::vehicle::ParameterError;
 use squirrel_log::files::read_text;
 use std::collections::BTreeMap;
 use std::path::Path;
+
+/// Thinner obstacles are nothing that a vehicle could hit, m. It stands here and not in the world,
+/// which is there with the feature `rapier` alone.
+pub const OBSTACLE_RADIUS_MIN_M: f64 = 1e-3;
 
 /// A flight to fly. Units are in the names; heights are positive up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -5,8 +5,8 @@
 //! interval drawn anew. The flight begins in the middle, where there is a gap, and ends with the
 //! first contact or after its way.
 
+use super::OBSTACLE_RADIUS_MIN_M;
 use crate::setting::SettingError;
-use crate::world::OBSTACLE_RADIUS_MIN_M;
 use squirrel_core::guidance::mission::scramble;
 
 use serde::{Deserialize, Serialize};

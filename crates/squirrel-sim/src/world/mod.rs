@@ -25,9 +25,7 @@ mod convert;
 mod grid;
 mod parameters;
 
-pub use parameters::{
-    Cylinder, MAX_OBSTACLES, OBSTACLE_RADIUS_MIN_M, RESTITUTION_MAX, WorldError, WorldParameters,
-};
+pub use parameters::{Cylinder, MAX_OBSTACLES, RESTITUTION_MAX, WorldError, WorldParameters};
 
 use grid::Grid;
 use nalgebra::{UnitQuaternion, Vector3};

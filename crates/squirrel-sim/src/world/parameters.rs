@@ -1,12 +1,10 @@
 //! What the world is made of, and what is refused.
 
+use crate::scenario::OBSTACLE_RADIUS_MIN_M;
 use squirrel_core::vehicle::ParameterError;
 
 /// Most obstacles of a world.
 pub const MAX_OBSTACLES: usize = 10_000;
-
-/// Thinner ones are nothing that a vehicle could hit, m.
-pub const OBSTACLE_RADIUS_MIN_M: f64 = 1e-3;
 
 /// Top restitution. Above it the impacts of a fast tumble give back more energy than they took:
 /// measured over 300 such flights, 12 % more with 0.8 at a step of 4 ms.
