@@ -14,7 +14,7 @@ use squirrel_core::dynamics::runge_kutta;
 use squirrel_core::dynamics::servo::{Servo, ServoState};
 use squirrel_core::dynamics::whole::{self, FLAT, MEMBRANE, NONE, Whole, lateral};
 use squirrel_core::effects::{PendulumState, Prepared, Swing};
-use squirrel_core::lane::vector::{minus, rotation, unit};
+use squirrel_core::lane::vector::{minus, rotation, scaled, unit};
 use squirrel_core::lane::{Row, load, store};
 use squirrel_core::math::real;
 use squirrel_sim::simd::{Kernel, Paths, Register};
@@ -205,7 +205,7 @@ fn fitted<L: Register, const ROTORS: usize, const WING: u8, const EFFECTS: bool>
             }
             if EFFECTS && vehicle.present.has_load() {
                 let gained = minus(&next.velocity, &state.velocity);
-                vehicle.swing.lead(&mut vehicle.load, [gained[0] * per_step, gained[1] * per_step]);
+                vehicle.swing.lead(&mut vehicle.load, scaled(&gained, per_step));
             }
             state = next;
         }

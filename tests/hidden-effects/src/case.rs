@@ -10,8 +10,8 @@ use crate::outside::Outside;
 use crate::overstate::{Overstatement, Stated};
 use crate::poor::Poor;
 use crate::recorder::{Capture, Estimator, Recorder, SensorFault};
-use crate::set::forms;
 pub use crate::set::{Generator, Set};
+use crate::set::{LOAD, forms};
 use crate::squirrel_made;
 use serde::{Deserialize, Serialize};
 use squirrel_log::{FlightLog, LogError};
@@ -151,11 +151,16 @@ impl Case {
             Set::Outside => answer.outside = Some(Outside::draw(index, &mut draw, mass_kg, rotors)),
             Set::Sensors => answer.recorder = Recorder::Faulty(SensorFault::draw(index, &mut draw)),
             Set::Two => {
-                let partners: Vec<_> =
-                    CATALOGUE.iter().filter(|other| first.goes_with(other)).collect();
-                let second = partners[draw.index(partners.len())];
-                answer.effects =
-                    vec![one(&mut draw, first, STANDARD), one(&mut draw, second, STANDARD)];
+                let with_a_partner = |first: &'static Entry, draw: &mut Draw| {
+                    let partners: Vec<_> =
+                        CATALOGUE.iter().filter(|other| first.goes_with(other)).collect();
+                    [first, partners[draw.index(partners.len())]]
+                };
+                let mut pair = with_a_partner(first, &mut draw);
+                while pair.iter().any(|entry| entry.name == LOAD) {
+                    pair = with_a_partner(&CATALOGUE[draw.index(CATALOGUE.len())], &mut draw);
+                }
+                answer.effects = pair.map(|entry| one(&mut draw, entry, STANDARD)).into();
             }
             Set::OtherForm => {
                 let forms = forms();

@@ -150,6 +150,10 @@ impl Set {
     }
 }
 
+/// Flown by itself: dashes that show other effects swing it up to the horizontal, where nobody flies
+/// a load and nothing of its swing can be foreseen.
+pub(crate) const LOAD: &str = "payload_swing";
+
 /// What position and attitude from outside, commands and voltage can show. Slow forces: drag, wind,
 /// lift over speed and climb, the wings' and the ground's, thrust that follows the voltage or is
 /// off, weight, a load that swings below 1 Hz, a thrust axis that leans. Trim, that is the moment

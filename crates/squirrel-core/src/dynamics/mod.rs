@@ -22,10 +22,10 @@ pub use rotors::RotorDrive;
 pub use state::State;
 
 use crate::aero::{self, Air, Airflow, BodyWrench, flat_plate};
-use crate::effects::{Acting, Effects, Prepared, Present, Situation};
+use crate::effects::{Acting, Effects, Prepared, Present, Situation, Tether};
 use crate::frames::{Body, In, Ned, Wrench};
 use crate::lane::Lane;
-use crate::lane::vector::{cross, plus, rotation, transposed_times};
+use crate::lane::vector::{cross, plus, rotation, times, transposed_times};
 use crate::math::{GRAVITY_M_S2, Real};
 use crate::vehicle::{MAX_ROTORS, Vehicle};
 use nalgebra::{Matrix3, Vector3};
@@ -85,20 +85,14 @@ pub struct Held<T: Real> {
     pub air_omega: Option<In<Ned, T>>,
     /// Deployment of the left and the right wing, 0..1; for effects on wings.
     pub deployment: [T; 2],
-    /// Pull of a load at the centre of mass, N; acts only where there are effects.
-    pub tether_force: In<Ned, T>,
+    /// A load at the centre of mass; acts only where there are effects.
+    pub tether: Option<Tether<T>>,
 }
 
 impl<T: Real> Held<T> {
     /// Nothing but rotors, in air that stands still.
     pub fn in_still_air(drive: RotorDrive<T>) -> Self {
-        Self {
-            drive,
-            wind: In::zero(),
-            air_omega: None,
-            deployment: [T::zero(); 2],
-            tether_force: In::zero(),
-        }
+        Self { drive, wind: In::zero(), air_omega: None, deployment: [T::zero(); 2], tether: None }
     }
 }
 
@@ -177,7 +171,7 @@ fn affected<T: Real>(
         rotor_speed: &speed[..vehicle.parameters().rotor_count.min(MAX_ROTORS)],
         wings: &vehicle.parameters().wing.as_ref().map_or(none, flat_plate::Pair::new),
         deployment: held.deployment,
-        tether_force: Some(held.tether_force.vector.into()),
+        tether: held.tether,
     };
     let [rotors, rest, _] = wrenches.map(BodyWrench::from);
     with_effects(numbers, present, [&rotors, &rest], &at).into()
@@ -185,7 +179,7 @@ fn affected<T: Real>(
 
 /// What effects may look at in a step.
 #[derive(Debug, Clone, Copy)]
-pub struct Surroundings<'a, L> {
+pub struct Surroundings<'a, L: Lane> {
     /// Motion through the air.
     pub flow: &'a Airflow<L>,
     /// Angular rate of the airframe, rad/s, whether the air turns or not.
@@ -206,8 +200,8 @@ pub struct Surroundings<'a, L> {
     pub wings: &'a flat_plate::Pair<L>,
     /// Left and right, 0..1.
     pub deployment: [L; 2],
-    /// Pull of a load at the centre of mass, world frame, N.
-    pub tether_force: Option<[L; 3]>,
+    /// A load at the centre of mass.
+    pub tether: Option<Tether<L>>,
 }
 
 /// The wrench of `[rotors, rest]` with everything that effects do to it.
@@ -240,8 +234,9 @@ pub fn with_effects<L: Lane>(
             deployment: at.deployment,
         },
     ));
-    if let Some(tether_force) = &at.tether_force {
-        sum.force = plus(&sum.force, &transposed_times(at.ned_from_body, tether_force));
+    if let Some(tether) = &at.tether {
+        let pull = tether.force(&times(at.ned_from_body, &sum.force), at.inverse_mass);
+        sum.force = plus(&sum.force, &transposed_times(at.ned_from_body, &pull));
     }
     if present.has_added_mass() {
         let added_mass_kg = numbers.added_mass_kg(present);

@@ -219,9 +219,11 @@ fn a_tether_pulls_in_the_world() {
     state.attitude =
         *nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, core::f64::consts::FRAC_PI_2);
     let mut held = Held::in_still_air(RotorDrive::holding([0.0; MAX_ROTORS]));
-    held.tether_force = In::new(Vector3::new(1.0, 0.0, 2.0));
+    // A vehicle that falls with its load feels no weight of it, but what it is swung round with.
+    held.tether = Some(Tether { mass_kg: 0.1, along: [0.6, 0.0, 0.8], circling_m_s2: 20.0 });
     let pull = affected_by("payload_swing", &[0.1, 0.5], &state, &held).force.vector;
-    assert!((pull - Vector3::new(0.0, -1.0, 2.0)).norm() < 1e-12, "north is to the left: {pull}");
+    let (along, share) = (Vector3::new(0.0, -0.6, 0.8), 1.0 / (1.0 + 0.1 / 0.548));
+    assert!((pull - along * (2.0 * share)).norm() < 1e-12, "north is to the left: {pull}");
 }
 
 #[test]

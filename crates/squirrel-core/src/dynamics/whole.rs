@@ -196,11 +196,7 @@ fn wrench<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>(
         wing_force,
         wings: &whole.plate,
         deployment: whole.deployment,
-        tether_force: if whole.present.has_load() {
-            Some(whole.swing.force(&whole.load))
-        } else {
-            None
-        },
+        tether: if whole.present.has_load() { Some(whole.swing.tether(&whole.load)) } else { None },
     };
     let sum = if L::FITS_A_REGISTER {
         with_effects(&whole.effects, whole.present, [&rotors, &rest], &at)

@@ -67,7 +67,7 @@ pub use constant_wind::ConstantWind;
 pub use gust::{GUST_SCALE_LENGTH_M, GUST_TIME_CONSTANT_S, Gust, GustSpectrum};
 pub use linear_drag::LinearDrag;
 pub use mass_error::MassError;
-pub use payload_swing::{Pendulum, PendulumState, Swing};
+pub use payload_swing::{Pendulum, PendulumState, Swing, Tether};
 pub use profile::{
     Declared, Fitted, Mimic, Profile, Ratio, Response, Shown, SideOf, Timing, Tolerance, Words,
 };

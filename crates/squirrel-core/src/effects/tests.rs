@@ -93,8 +93,8 @@ fn actions(effects: &Effects<f64>) -> Vec<f64> {
     };
     let load = effects.pendulum().map_or([0.0; 3], |load| {
         let (swing, mut state) = (load.over(0.2), PendulumState::at_rest());
-        swing.lead(&mut state, [1.0, 0.0]);
-        swing.force(&state)
+        swing.lead(&mut state, [1.0, 0.0, 0.0]);
+        swing.tether(&state).force(&[0.0, 0.0, -5.0], 2.0)
     });
     let mut all = vec![
         gust,

@@ -16,18 +16,35 @@ impl Search<'_> {
     /// # Errors
     /// What the predictor says.
     pub(super) fn choose_forms(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
-        for index in 0..best.members.len() {
-            for form in self.other_forms(&best.members[index]) {
+        if let Some(other) = self.in_better_forms(linear, best)? {
+            *best = other;
+        }
+        Ok(())
+    }
+
+    /// A set with members in other forms, if one of them has more evidence.
+    ///
+    /// # Errors
+    /// What the predictor says.
+    pub(super) fn in_better_forms(
+        &self,
+        linear: &Linear,
+        set: &Scored,
+    ) -> Result<Option<Scored>, GapError> {
+        let mut better: Option<Scored> = None;
+        for index in 0..set.members.len() {
+            for form in self.other_forms(&better.as_ref().unwrap_or(set).members[index]) {
+                let best = better.as_ref().unwrap_or(set);
                 let mut members = best.members.clone();
                 members[index] = form;
                 let scored = self.score(linear, &members)?;
                 (self.progress)();
                 if scored.log_evidence > best.log_evidence + FORM_NATS && self.is_off(&scored) {
-                    *best = scored;
+                    better = Some(scored);
                 }
             }
         }
-        Ok(())
+        Ok(better)
     }
 
     /// Name of a member's form; `standard` where there is one only.

@@ -398,10 +398,11 @@ impl Search<'_> {
                 let mut rest = best.members.clone();
                 let out = rest.remove(i);
                 let without = self.score(linear, &rest)?;
-                if without.log_evidence > best.log_evidence - self.needed(&out) {
-                    *best = without;
-                    // What was chosen beside it may have another form alone.
-                    self.choose_forms(linear, best)?;
+                let least = best.log_evidence - self.needed(&out);
+                // What was chosen beside it may have another form alone.
+                let other = self.in_better_forms(linear, &without)?;
+                if other.as_ref().unwrap_or(&without).log_evidence > least {
+                    *best = other.unwrap_or(without);
                     changed = true;
                     break;
                 }

@@ -29,7 +29,6 @@ use squirrel_core::dynamics::servo::Servo;
 use squirrel_core::dynamics::{self, Held, RotorDrive, State, VectorSpace, rk4};
 use squirrel_core::effects::{Acting, Effects, Pendulum, PendulumState, Swing};
 use squirrel_core::frames::{Body, In, Ned, Wrench};
-use squirrel_core::nalgebra::Vector3;
 use squirrel_core::vehicle::{PerRotor, Vehicle, Wing};
 
 /// How the wings of the plant behave. Independent of what the controller believes.
@@ -303,9 +302,8 @@ impl Plant {
 
     #[inline(always)]
     fn held(&self, state: &PlantState, wind: In<Ned, f64>, deployment: [f64; 2]) -> Held<f64> {
-        let tether_force =
-            self.swing.map_or(In::zero(), |swing| In::new(Vector3::from(swing.force(&state.load))));
-        Held { drive: state.drive, wind, air_omega: state.air_omega, deployment, tether_force }
+        let tether = self.swing.map(|swing| swing.tether(&state.load));
+        Held { drive: state.drive, wind, air_omega: state.air_omega, deployment, tether }
     }
 
     /// Motion of the airframe through the air.
@@ -383,7 +381,7 @@ impl Plant {
         }
         if let Some(swing) = &self.swing {
             let acceleration = (state.body.velocity - before.velocity) * (1.0 / dt);
-            swing.lead(&mut state.load, acceleration.vector.xy().into());
+            swing.lead(&mut state.load, acceleration.vector.into());
         }
         state.time_s += dt;
         state.led_s = 0.0;

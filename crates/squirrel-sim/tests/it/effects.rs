@@ -384,9 +384,9 @@ fn a_led_plant_reads_the_accelerometer_of_the_log() {
         drift = state.time_s - read[i + 1].0;
     }
     assert!(drift.abs() < 1e-9, "the plant's clock is {drift} s off the log's");
-    // What is left is the rounding of the log's sensors to single precision, and the load between
-    // samples.
-    assert!(worst < 1e-4, "{worst} m/s^2");
+    // What is left is the rounding of the log's sensors to single precision, and the load's tension
+    // between samples.
+    assert!(worst < 4e-3, "{worst} m/s^2");
 }
 
 /// Plants are asked at many states at once, on registers: each effect and form, without wings, with

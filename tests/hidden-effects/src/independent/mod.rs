@@ -39,7 +39,7 @@ use controller::{Controller, Estimate};
 use extras::Extras;
 use nalgebra::{Quaternion, Vector2, Vector3, Vector4};
 use physics::{Input, World};
-use programme::Programme;
+use programme::{Programme, WITH_A_LOAD};
 use sensors::Inertial;
 use squirrel_log::FlightLog;
 use state::State;
@@ -136,7 +136,9 @@ fn simulate(
 ) -> Result<Vec<Truth>, String> {
     let tick_s = 1.0 / IMU_HZ;
     let dt_s = tick_s / STEPS as f64;
-    let mut programme = Programme::new(order.excitation, order.further, &mut stream(0));
+    let (excitation, pace) =
+        if world.extras.payload_kg > 0.0 { WITH_A_LOAD } else { (order.excitation, 1.0) };
+    let mut programme = Programme::new(excitation, order.further, &mut stream(0));
     let mut controller = Controller::new(order.nominal);
     let mut air = Air::new(world.extras.gust, stream(1));
     let mut inertial =
@@ -162,7 +164,7 @@ fn simulate(
     };
     for tick in 0..ticks {
         let time_s = tick as f64 * tick_s;
-        let wanted = programme.step(time_s, tick_s);
+        let wanted = programme.step(pace * time_s, pace * tick_s).slower(pace);
         let (gyro, attitude) = inertial.step(state.omega, state.attitude);
         let estimate =
             Estimate { position: state.position, velocity: state.velocity, attitude, omega: gyro };

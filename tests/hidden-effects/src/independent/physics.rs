@@ -245,12 +245,17 @@ impl World {
             force += Vector3::new(sum(0), sum(1), sum(2));
             moment += Vector3::new(sum(3), sum(4), sum(5));
         }
-        let pull = x.payload_kg * GRAVITY_M_S2;
-        let swing_force = Vector3::new(state.swing.x, state.swing.y, x.payload_length_m)
-            * (pull / x.payload_length_m);
-        force += rotation.tr_mul(&swing_force);
-
         let mass = a.mass_kg * x.mass * unknown.mass_factor;
+        // A rod between two masses keeps its length, whatever they do.
+        let (s, s_rate) = (state.swing.xy(), Vector2::new(state.swing.z, state.swing.w));
+        let below = (x.payload_length_m.powi(2) - s.norm_squared()).max(0.0).sqrt();
+        let rod = Vector3::new(s.x, s.y, below) / x.payload_length_m;
+        let sinking = -s.dot(&s_rate) / below.max(1e-9);
+        let round = (s_rate.norm_squared() + sinking * sinking) / x.payload_length_m;
+        let pull = x.payload_kg * (round - rod.dot(&(rotation * force)) / mass)
+            / (1.0 + x.payload_kg / mass);
+        force += rotation.tr_mul(&(rod * pull));
+
         let gravity_body = rotation.tr_mul(&Vector3::new(0.0, 0.0, GRAVITY_M_S2));
         let mut specific = force / mass;
         if x.added_mass_kg > 0.0 {
@@ -264,8 +269,8 @@ impl World {
         let omega_rate = torque.component_div(&inertia.diagonal());
         let acceleration = rotation * specific + GRAVITY_M_S2 * e3;
         let servo = a.servo_time_constant_s + x.servo_lag_s;
-        let swing_rate = |s: f64, rate: f64, a: f64| {
-            -GRAVITY_M_S2 / x.payload_length_m * s - x.payload_damping_per_s * rate - a
+        let swing_rate = |rod: f64, rate: f64, a: f64| {
+            -pull / x.payload_kg * rod - x.payload_damping_per_s * rate - a
         };
         let swing = state.swing;
         let lever = -x.cg_m;
@@ -281,8 +286,8 @@ impl World {
                     Vector4::new(
                         swing.z,
                         swing.w,
-                        swing_rate(swing.x, swing.z, acceleration.x),
-                        swing_rate(swing.y, swing.w, acceleration.y),
+                        swing_rate(rod.x, swing.z, acceleration.x),
+                        swing_rate(rod.y, swing.w, acceleration.y),
                     )
                 } else {
                     Vector4::zeros()

@@ -38,6 +38,22 @@ pub(super) struct Reference {
     pub(super) heave_m_s2: f64,
 }
 
+/// How a load is flown, and at what pace: else it swings up to the horizontal, where nobody flies
+/// one and nothing of its swing can be foreseen.
+pub(super) const WITH_A_LOAD: (Excitation, f64) = (Excitation::Normal, 0.5);
+
+impl Reference {
+    /// The same way at another pace.
+    pub(super) fn slower(self, pace: f64) -> Self {
+        Self {
+            velocity: self.velocity * pace,
+            acceleration: self.acceleration * (pace * pace),
+            yaw_rate: self.yaw_rate * pace,
+            ..self
+        }
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Manoeuvre {
     Hover {
