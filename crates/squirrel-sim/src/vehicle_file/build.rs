@@ -4,7 +4,7 @@ use super::VehicleFile;
 use super::tables::{
     AngleLawName, AttitudeTable, BatteryTable, CommandName, ControlTable, EffectValue, FormName,
     InertiaValue, PlusTable, PositionTable, PropulsionTable, RotorTable, ThrustLawName,
-    TriggerName, VehicleTable, WingControlTable, WingName, WingTable, WingTestName,
+    TiltLimitName, TriggerName, VehicleTable, WingControlTable, WingName, WingTable, WingTestName,
 };
 use crate::estimator::Estimator;
 use crate::plant::{
@@ -13,7 +13,7 @@ use crate::plant::{
 use crate::quantity::Quantity;
 use crate::weights::ParnnWeights;
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
-use squirrel_core::control::plus::{Feels, Plus};
+use squirrel_core::control::plus::{Feels, Plus, TiltLimit};
 use squirrel_core::control::position::{AngleLaw, PositionGains};
 use squirrel_core::control::supply::ThrustByVoltage;
 use squirrel_core::control::twcc::{Trigger, TwccParameters, WingPolicy};
@@ -544,5 +544,9 @@ fn plus(t: &PlusTable, position: &PositionGains) -> Plus {
         open_above_m_s2: t.open_above_m_s2.0 as f32,
         wing_download_n: t.wing_download_n.as_ref().map_or(0.0, |n| n.0 as f32),
         feels: Feels::BodyZ,
+        tilt_limit: match t.tilt_limit {
+            TiltLimitName::Box => TiltLimit::Box,
+            TiltLimitName::Cone => TiltLimit::Cone,
+        },
     }
 }

@@ -261,6 +261,16 @@ pub(super) struct PlusTable {
     pub(super) integral_max_m: Option<Number>,
     /// What the file's effects say, if it is left out.
     pub(super) wing_download_n: Option<Number>,
+    #[serde(default)]
+    pub(super) tilt_limit: TiltLimitName,
+}
+
+#[derive(Deserialize, Clone, Copy, Default)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum TiltLimitName {
+    Box,
+    #[default]
+    Cone,
 }
 
 /// Files of before this number have it not.

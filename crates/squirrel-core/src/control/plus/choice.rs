@@ -3,6 +3,7 @@
 
 use super::super::AttitudeThrust;
 use super::super::twcc::OuterAirframe;
+use super::lean::Lean;
 use crate::aero::flat_plate;
 use crate::frames::{In, Ned};
 use crate::math::{GRAVITY_M_S2, limit, sqrt};
@@ -44,6 +45,8 @@ pub(super) struct Demand<'a> {
     pub(super) acceleration: Vector3<f32>,
     /// `W_z^2`.
     pub(super) weight: f32,
+    /// How far thrust may lean.
+    pub(super) lean: Lean,
 }
 
 /// An attitude with what it leaves of the demand.
@@ -131,18 +134,14 @@ impl Demand<'_> {
     /// The best attitude near a first guess.
     #[inline(never)]
     pub(super) fn best(&self, guess: &AttitudeThrust, wings: f32) -> Choice {
-        let max = self.believed.airframe.envelope.tilt_max_rad;
-        let guess = self.believed.airframe.envelope.limit(guess);
-        let mut best = self.at(guess.roll_rad, guess.pitch_rad, wings);
+        let (roll_rad, pitch_rad) = self.lean.within(guess.roll_rad, guess.pitch_rad);
+        let mut best = self.at(roll_rad, pitch_rad, wings);
         let mut step = STEP_RAD;
         for _ in 0..ROUNDS {
             for (roll, pitch) in [(step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step)] {
                 let AttitudeThrust { roll_rad, pitch_rad, .. } = best.command;
-                let next = self.at(
-                    limit(roll_rad + roll, -max, max),
-                    limit(pitch_rad + pitch, -max, max),
-                    wings,
-                );
+                let (roll_rad, pitch_rad) = self.lean.within(roll_rad + roll, pitch_rad + pitch);
+                let next = self.at(roll_rad, pitch_rad, wings);
                 if next.cost < best.cost {
                     best = next;
                 }

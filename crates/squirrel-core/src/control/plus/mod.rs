@@ -6,12 +6,14 @@
 //!
 //! ```text
 //! min over roll, pitch, U, w of  | W (g e3 - U n/m + w f(n)/m - a_cmd) |^2      n = R e3, W = diag(1, 1, W_z)
-//! |roll|, |pitch| <= tilt_max        U_min <= U <= U_max        w = 0 or 1
+//! n_z >= cos tilt        U_min <= U <= U_max        w = 0 or 1
 //! ```
 //!
 //! For an attitude and a wing, U is a formula; the attitude is found by a pattern search of seven
 //! rounds that starts from PC's request, so that work is bounded. What else is different from the
 //! paper's laws:
+//! - thrust leans in a cone ([`TiltLimit`]), to every side as far as in the corners of the paper's
+//!   box, and no farther than thrust holds height;
 //! - `f` is the flat plate at the *commanded* attitude: the present one is level when a turn
 //!   begins, and says that wings do not help;
 //! - motion and reference are those of [`Plus::delay_s`] ahead, when what is commanded now acts:
@@ -38,6 +40,7 @@
 //! they no longer make it smaller. Without wings it is the same controller: the fair rival.
 
 mod choice;
+mod lean;
 mod sink;
 #[cfg(test)]
 mod tests;
@@ -50,6 +53,7 @@ use super::wiic::Envelope;
 use crate::math::{GRAVITY_M_S2, cos, limit, lower, sqrt, upper};
 use crate::vehicle::{ParameterError, positive};
 use choice::{Believed, Residual};
+pub use lean::TiltLimit;
 use nalgebra::Vector3;
 
 /// With which a climb is turned, and a sink at most, m/s^2.
@@ -108,6 +112,8 @@ pub struct Plus {
     pub wing_download_n: f32,
     /// What is felt in flight.
     pub feels: Feels,
+    /// How far thrust may lean.
+    pub tilt_limit: TiltLimit,
 }
 
 impl Plus {

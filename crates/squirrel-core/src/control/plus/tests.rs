@@ -5,6 +5,7 @@ use super::super::twcc::OuterAirframe;
 use super::super::twcc::fixtures::{airframe, parameters};
 use super::super::twcc::{Reason, TwccParameters, TwccState, TwccTerms, WingPolicy};
 use super::choice::{Believed, Demand, Residual, normal};
+use super::lean::Lean;
 use super::*;
 use crate::frames::{Body, In, Ned, Rotation};
 use proptest::prelude::*;
@@ -28,6 +29,7 @@ pub(super) fn plus() -> Plus {
         open_above_m_s2: 0.3,
         wing_download_n: 0.0,
         feels: Feels::BodyZ,
+        tilt_limit: TiltLimit::Cone,
     }
 }
 
@@ -37,7 +39,15 @@ fn calm(airframe: &OuterAirframe) -> Believed<'_> {
 
 fn demand(airframe: &OuterAirframe, acceleration: [f32; 3], velocity: [f32; 3]) -> Demand<'_> {
     let believed = Believed { velocity: velocity.into(), ..calm(airframe) };
-    Demand { believed, acceleration: acceleration.into(), weight: 0.25 }
+    let lean = Lean::of(TiltLimit::Cone, airframe);
+    Demand { believed, acceleration: acceleration.into(), weight: 0.25, lean }
+}
+
+/// As the position loop asks, which knows no wings.
+fn request(forward: f32, right: f32, down: f32) -> AttitudeThrust {
+    let pitch_rad = libm::atan2f(-forward, 9.8 - down);
+    let roll_rad = libm::atan2f(right * cos(pitch_rad), 9.8 - down);
+    AttitudeThrust { roll_rad, pitch_rad, thrust_n: 5.0 }
 }
 
 /// Braking from 7 m/s, level, the goal here.
@@ -74,10 +84,7 @@ proptest! {
     ) {
         let airframe = airframe();
         let demand = demand(&airframe, [forward, right, down], [speed, 0.0, 0.0]);
-        // As the position loop does, which knows no wings.
-        let pitch_rad = libm::atan2f(-forward, 9.8 - down);
-        let roll_rad = libm::atan2f(right * libm::cosf(pitch_rad), 9.8 - down);
-        let guess = AttitudeThrust { roll_rad, pitch_rad, thrust_n: 5.0 };
+        let guess = request(forward, right, down);
         let best = demand.best(&guess, f32::from(wings));
         prop_assume!(best.command.roll_rad.abs() < 0.5 && best.command.pitch_rad.abs() < 0.5);
         prop_assume!(best.command.thrust_n > 0.6 && best.command.thrust_n < 9.9);
@@ -86,7 +93,7 @@ proptest! {
         prop_assert!((got - demand.acceleration).norm() < 0.3, "{got} for {}", demand.acceleration);
     }
 
-    /// No grid of a degree over the box and no thrust finds anything better than a hundredth.
+    /// No grid of a degree over the cone and no thrust finds anything better than a hundredth.
     #[test]
     fn outside_them_the_search_finds_what_a_grid_finds(
         forward in -20.0..20.0f32, right in -10.0..10.0f32, down in -6.0..6.0f32, speed in 0.0..9.0f32, climb in -4.0..4.0f32,
@@ -96,11 +103,11 @@ proptest! {
         airframe.envelope.thrust_max_n = thrust_max_n;
         let demand = demand(&airframe, [forward, right, down], [speed, 0.0, climb]);
         let wings = f32::from(wings);
-        let guess = AttitudeThrust { roll_rad: 0.1 * right, pitch_rad: -0.1 * forward, thrust_n: 5.0 };
-        let best = demand.best(&guess, wings);
-        let degrees = || (-30i8..=30).map(|k| f32::from(k).to_radians());
+        let best = demand.best(&request(forward, right, down), wings);
+        let degrees = || (-42i8..=42).map(|k| f32::from(k).to_radians());
         let grid = degrees()
             .flat_map(|roll| degrees().map(move |pitch| (roll, pitch)))
+            .filter(|(roll, pitch)| demand.lean.within(*roll, *pitch) == (*roll, *pitch))
             .map(|(roll, pitch)| demand.at(roll, pitch, wings).cost)
             .fold(f32::INFINITY, f32::min);
         prop_assert!(best.cost <= grid * 1.01 + 0.02, "{best:?}, grid {grid}");
@@ -270,4 +277,57 @@ fn a_bad_parameter_is_named() {
             .starts_with("control.position.integral_max_m = -1")
     );
     plus().check().unwrap();
+}
+
+/// What leans too far leans to the same side as far as it may, wherever the nose points; the box's
+/// corner is as far, and never what thrust cannot hold.
+#[test]
+fn a_cone_has_no_corners() {
+    let mut airframe = airframe();
+    let weight_n = airframe.mass_kg * GRAVITY_M_S2 as f32;
+    let box_max = airframe.envelope.tilt_max_rad;
+    let corner = libm::acosf(cos(box_max) * cos(box_max));
+    for (thrust_to_weight, most_rad) in
+        [(1.0, box_max), (1.2, libm::acosf(0.97 / 1.2)), (1.3, corner), (3.0, corner)]
+    {
+        airframe.envelope.thrust_max_n = thrust_to_weight * weight_n;
+        let cone = Lean::of(TiltLimit::Cone, &airframe);
+        for side in 0u8..24 {
+            let (right, ahead) = libm::sincosf(f32::from(side) * core::f32::consts::TAU / 24.0);
+            let (roll_rad, pitch_rad) = (1.2 * right, -1.2 * ahead);
+            let (asked, n) = (normal(roll_rad, pitch_rad), {
+                let (roll_rad, pitch_rad) = cone.within(roll_rad, pitch_rad);
+                normal(roll_rad, pitch_rad)
+            });
+            assert!((libm::acosf(n.z) - most_rad).abs() < 1e-3, "{thrust_to_weight} {side}: {n}");
+            let beside = n.x * asked.y - n.y * asked.x;
+            assert!(beside.abs() < 1e-5 && n.x * asked.x + n.y * asked.y > 0.0, "{side}");
+            let within = (0.5 * right, -0.1 * ahead);
+            assert_eq!(cone.within(within.0, within.1), within);
+        }
+    }
+    // A small-angle request of 3 rad leans ahead, not back.
+    let cone = Lean::of(TiltLimit::Cone, &airframe);
+    assert!(cone.within(0.0, -3.0).1 < -0.5);
+    let four_sides = Lean::of(TiltLimit::Box, &airframe);
+    assert_eq!(four_sides.within(1.2, -0.1), (box_max, -0.1));
+    assert_eq!(four_sides.within(-1.2, 1.2), (-box_max, box_max));
+}
+
+/// Braking along the nose and across it are the same in the cone; the box brakes less along an axis.
+#[test]
+fn it_brakes_alike_to_every_side() {
+    let mut airframe = airframe();
+    airframe.envelope.thrust_max_n = 2.0 * airframe.mass_kg * GRAVITY_M_S2 as f32;
+    let left = |tilt: TiltLimit, heading_rad: f32| {
+        let (s, c) = libm::sincosf(heading_rad);
+        let asked = demand(&airframe, [-8.0 * c, -8.0 * s, 0.0], [0.0; 3]);
+        let asked = Demand { lean: Lean::of(tilt, &airframe), ..asked };
+        let guess = AttitudeThrust { roll_rad: -0.6 * s, pitch_rad: 0.6 * c, thrust_n: 5.0 };
+        sqrt(asked.best(&guess, 0.0).cost)
+    };
+    for heading_rad in [0.0, 0.4, 0.785, 1.2, 1.571] {
+        assert!(left(TiltLimit::Cone, heading_rad) < 0.1, "{heading_rad}");
+    }
+    assert!(left(TiltLimit::Box, 0.0) > 1.0 && left(TiltLimit::Box, 0.785) < 0.1);
 }

@@ -7,6 +7,7 @@ use super::super::twcc::{
 use super::super::woeg::WingFlag;
 use super::super::{AttitudeThrust, Reference};
 use super::choice::{Believed, Demand, between, saved};
+use super::lean::Lean;
 use super::{HARM_SHARE, Plus};
 use crate::aero::angle_of_attack;
 use crate::frames::{Body, In, Ned, Rotation};
@@ -73,6 +74,7 @@ impl TwccParameters {
                 ahead.position.vector.z - goal.position.vector.z,
                 ahead.velocity.vector.z - goal.velocity.vector.z,
             ),
+            lean: Lean::of(plus.tilt_limit, airframe),
         };
         let folded = demand.best(request, 0.0);
         let (mut best, mut reason, mut helpful_n) = (folded, Reason::PolicyFixed, 0.0);

@@ -3,7 +3,7 @@
 
 use super::{Reader, Wire, Writer, wire_enum, wire_struct};
 use crate::control::backstepping::{AttitudeForm, AttitudeGains};
-use crate::control::plus::{Feels, Plus};
+use crate::control::plus::{Feels, Plus, TiltLimit};
 use crate::control::position::{AngleLaw, PositionGains};
 use crate::control::supply::ThrustByVoltage;
 use crate::control::twcc::{Trigger, TwccParameters, WingPolicy};
@@ -247,7 +247,7 @@ wire_struct! {
     TwccParameters {
         position, wing_events, thrust_law, trigger, force_model, policy, dwell_s, thrust_min_n, plus,
     }
-    Plus { position, delay_s, vertical_weight, height_band_m, sink_band_m, thrust_share, approach_share, open_above_m_s2, wing_download_n, feels }
+    Plus { position, delay_s, vertical_weight, height_band_m, sink_band_m, thrust_share, approach_share, open_above_m_s2, wing_download_n, feels, tilt_limit }
     PositionGains {
         position_per_s, velocity_per_s, integral_per_s2, derivative, velocity_feed_forward, acceleration_feed_forward, approach_max_m_s2,
         speed_max_m_s, acceleration_max_horizontal_m_s2, acceleration_max_vertical_m_s2, integral_max_m, angle_law,
@@ -276,5 +276,6 @@ wire_enum! {
     ThrustLaw { Literal, Exact }
     Trigger { Angle, AngleOrThrust }
     Feels { BodyZ, Everything }
+    TiltLimit { Box, Cone }
     WingPolicy { Folded, Open, Coordinated, CoordinatedWithoutWings }
 }
