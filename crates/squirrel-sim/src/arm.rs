@@ -202,11 +202,13 @@ impl Arm {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vehicle_file::VehicleFile;
+    use squirrel_core::control::plus::TiltLimit;
 
     /// Rivals as well armed: the paper's law with our gains, ours with another belief.
     #[test]
     fn rivals_have_what_ours_has() {
-        let file = crate::vehicle_file::VehicleFile::squirrel();
+        let file = VehicleFile::squirrel();
         let of = |arm: Arm| {
             let mut twcc = file.control.unwrap().twcc;
             arm.configure(&mut twcc, file.weights.as_ref()).unwrap();
@@ -233,6 +235,27 @@ mod tests {
             let error = arm.configure(&mut bare.clone(), None).unwrap_err();
             assert!(error.contains("needs [control.plus]"), "{error}");
         }
+    }
+
+    /// Ours lean in a cone unless the vehicle file asks for the box of the paper's laws.
+    #[test]
+    fn a_file_may_ask_for_the_papers_box() {
+        let with = |line: &str| {
+            let file = VehicleFile::squirrel();
+            let text = file.text.replace("[control.plus]", &format!("[control.plus]\n{line}"));
+            assert!(line.is_empty() || text != file.text);
+            VehicleFile::parse(&text, "squirrel.toml")
+        };
+        for (line, limit) in [("", TiltLimit::Cone), ("tilt_limit = \"box\"", TiltLimit::Box)] {
+            let file = with(line).unwrap();
+            for arm in [Arm::TwccPlus, Arm::PcPlus, Arm::Indi] {
+                let mut twcc = file.control.unwrap().twcc;
+                arm.configure(&mut twcc, None).unwrap();
+                assert_eq!(twcc.plus.unwrap().tilt_limit, limit, "{line} {arm:?}");
+            }
+        }
+        let error = with("tilt_limit = \"sphere\"").unwrap_err().to_string();
+        assert!(error.contains("sphere") && error.contains("`box` or `cone`"), "{error}");
     }
 
     #[test]

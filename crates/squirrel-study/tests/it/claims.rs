@@ -168,17 +168,20 @@ fn the_better_controller_comes_through_the_forest() {
     }
 }
 
-/// At T/W 1.3, of the record: a turn into the trunk has to end in front of it.
+/// At T/W 1.3, of the record: a turn into the trunk has to end in front of it, and does so with wings.
 #[test]
-fn the_side_of_the_turn_decides_where_thrust_is_scarce() {
+fn wings_decide_where_thrust_is_scarce_and_turns_lead_into_trunks() {
     let of = |list: &str, arm: &str, what: &str| {
         number("forest_scarce", &format!("{list}[arm={arm}]/{what}"))
     };
     let share = "in_band/share";
     let [drawn, away] = ["limited", "away"];
-    assert!(of(drawn, "twcc_plus", &format!("{share}/high")) < 0.5);
-    assert!(of(away, "twcc_plus", &format!("{share}/low")) > 0.85);
-    assert!(of(away, "twcc_plus", "over_pc_plus/low") > 0.1, "wings are worth it there, too");
+    assert!(of(drawn, "twcc_plus", &format!("{share}/value")) >= 0.7);
+    assert!(of(drawn, "twcc_plus", "over_pc_plus/low") > 0.5, "wings");
+    for arm in ["twcc_plus", "pc_plus"] {
+        assert!(of(away, arm, &format!("{share}/low")) > 0.9, "{arm}: nothing to stop for");
+    }
+    assert!(of(away, "pc", &format!("{share}/high")) < 0.2);
 }
 
 /// Counts and ways of a few flights.
