@@ -58,7 +58,8 @@ impl Lean {
             Self::Cone(least) => {
                 let steepest = upper(roll_rad.abs(), pitch_rad.abs());
                 let share = STEEP_RAD / upper(steepest, STEEP_RAD);
-                let n = normal(roll_rad * share, pitch_rad * share);
+                let (roll_rad, pitch_rad) = (roll_rad * share, pitch_rad * share);
+                let n = normal(roll_rad, pitch_rad);
                 if n.z >= least {
                     return (roll_rad, pitch_rad);
                 }
