@@ -165,6 +165,19 @@ impl World {
         features::of(&self.motion(state, input, &rotation, air_body, 0.0))
     }
 
+    /// To where a load hangs, and what it pulls, N. A rod between two masses keeps its length,
+    /// whatever they do.
+    fn rod(&self, state: &State, force_ned: &Vector3<f64>, mass_kg: f64) -> (Vector3<f64>, f64) {
+        let x = &self.extras;
+        let (s, s_rate) = (state.swing.xy(), Vector2::new(state.swing.z, state.swing.w));
+        let below = (x.payload_length_m.powi(2) - s.norm_squared()).max(0.0).sqrt();
+        let rod = Vector3::new(s.x, s.y, below) / x.payload_length_m;
+        let sinking = -s.dot(&s_rate) / below.max(1e-9);
+        let round = (s_rate.norm_squared() + sinking * sinking) / x.payload_length_m;
+        let shared = 1.0 + x.payload_kg / mass_kg;
+        (rod, x.payload_kg * (round - rod.dot(force_ned) / mass_kg) / shared)
+    }
+
     /// Rates of everything at a state, `ahead_s` after the start of the step.
     pub(super) fn rates(&self, state: &State, input: &Input, ahead_s: f64) -> Rates {
         let (a, x) = (&self.airframe, &self.extras);
@@ -246,14 +259,7 @@ impl World {
             moment += Vector3::new(sum(3), sum(4), sum(5));
         }
         let mass = a.mass_kg * x.mass * unknown.mass_factor;
-        // A rod between two masses keeps its length, whatever they do.
-        let (s, s_rate) = (state.swing.xy(), Vector2::new(state.swing.z, state.swing.w));
-        let below = (x.payload_length_m.powi(2) - s.norm_squared()).max(0.0).sqrt();
-        let rod = Vector3::new(s.x, s.y, below) / x.payload_length_m;
-        let sinking = -s.dot(&s_rate) / below.max(1e-9);
-        let round = (s_rate.norm_squared() + sinking * sinking) / x.payload_length_m;
-        let pull = x.payload_kg * (round - rod.dot(&(rotation * force)) / mass)
-            / (1.0 + x.payload_kg / mass);
+        let (rod, pull) = self.rod(state, &(rotation * force), mass);
         force += rotation.tr_mul(&(rod * pull));
 
         let gravity_body = rotation.tr_mul(&Vector3::new(0.0, 0.0, GRAVITY_M_S2));
