@@ -35,7 +35,12 @@ const CHORES: [Chore; 21] = [
         "everything that a change must pass; sets up what it needs; --quick: minutes, without what is slow",
         chores::test,
     ),
-    ("lint", "", "format, clippy and documentation only", chores::lint),
+    (
+        "lint",
+        "",
+        "format, clippy, the simulator without rapier and documentation only",
+        chores::lint,
+    ),
     (
         "bench",
         "[ARGUMENT...]",

@@ -15,7 +15,7 @@ use crate::math::{GRAVITY_M_S2, cos, limit, sqrt, upper};
 
 /// Share of the weight that thrust holds at the cone's limit: spread wings carry some of it in a
 /// turn, and what is lacking of a turn lasts longer.
-const HELD_SHARE: f32 = 0.97;
+const CARRIED_SHARE: f32 = 0.97;
 /// Angles beyond are taken smaller, both by the same share: a request of the small-angle law knows
 /// no right angle, behind which a vehicle leans to the other side.
 const STEEP_RAD: f32 = 1.5;
@@ -45,7 +45,7 @@ impl Lean {
             TiltLimit::Box => Self::Box(envelope.tilt_max_rad),
             TiltLimit::Cone => {
                 let one_angle = cos(envelope.tilt_max_rad);
-                let held = HELD_SHARE * mass_kg * GRAVITY_M_S2 as f32 / envelope.thrust_max_n;
+                let held = CARRIED_SHARE * mass_kg * GRAVITY_M_S2 as f32 / envelope.thrust_max_n;
                 Self::Cone(limit(held, one_angle * one_angle, one_angle))
             }
         }
