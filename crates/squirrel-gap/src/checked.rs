@@ -134,7 +134,15 @@ impl NumberCheck {
     }
 }
 
+/// What an effect of wings lacks where there are none.
+pub(crate) const NO_WINGS: &str = "the vehicle has no wings";
+
 impl EffectCheck {
+    /// Whether the vehicle has the part that it acts on.
+    pub(crate) fn could_be(&self) -> bool {
+        self.lacks.as_deref() != Some(NO_WINGS)
+    }
+
     /// The number by which the choice that is shown worst is shown best: its size decides.
     pub fn decisive(&self) -> Option<&NumberCheck> {
         let size = |number: &NumberCheck| {

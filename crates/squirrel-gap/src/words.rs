@@ -98,6 +98,8 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool
         None => "The vehicle file lacks",
     };
     let mut text = match verdict.verdict {
+        // What moved beyond its tolerance is said below.
+        Kind::None if !verdict.moved.is_empty() => "No effect has the evidence that a name needs.".to_owned(),
         Kind::None => "No effect above its tolerance: what the flights disagree by is what noise and the declared tolerances explain.".to_owned(),
         Kind::Named => format!("{lacks} {effects}."),
         Kind::NamedFormDiffers => format!(
@@ -117,7 +119,12 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool
             blind.join(", ")
         ),
         Kind::NotIdentifiable if effects.is_empty() => format!(
-            "Nothing above its tolerance shows, but these flights would not show {} at any plausible size.",
+            "{}, but these flights would not show {} at any plausible size.",
+            if verdict.moved.is_empty() {
+                "Nothing above its tolerance shows"
+            } else {
+                "No effect has the evidence that a name needs"
+            },
             blind.join(", ")
         ),
         Kind::NotIdentifiable => format!("Something is missing, and too many names explain it in these flights: {effects}, or {}.", others.join("; ")),

@@ -1,7 +1,7 @@
 //! What flights could show of each effect of the catalogue.
 
 use crate::GapError;
-use crate::checked::{Choice, EffectCheck, NumberCheck, Shows};
+use crate::checked::{Choice, EffectCheck, NO_WINGS, NumberCheck, Shows};
 use crate::compatibility::Ready;
 use crate::diagnose::curve_hides_sag;
 use crate::name::{Catalogue, Scatter, Search, Showable, air_hides_names, catalogue, gust_sizes};
@@ -172,7 +172,7 @@ fn hold_for(effect: &mut EffectCheck, hz: f64) {
 fn lacks(predictor: &Predictor<'_>, profile: &Profile) -> &'static str {
     let shown = profile.shown;
     if profile.is_of_wings && predictor.vehicle.wing == WingPlant::None {
-        "the vehicle has no wings"
+        NO_WINGS
     } else if shown.has(Shown::ACCELEROMETER) && !predictor.has_accelerometer() {
         "imu.specific_force_body_m_s2: the logs have no accelerometer"
     } else if shown.has(Shown::TURNS) && !predictor.has_channel(TURNING) {

@@ -200,12 +200,14 @@ fn paragraph(flights: &[FlightCheck], effects: &[EffectCheck]) -> String {
     if effects.is_empty() {
         return format!("{data}. Nothing can be named from them: mend the import first.");
     }
+    let possible = || effects.iter().filter(|effect| effect.could_be());
     let cannot: Vec<&str> =
-        effects.iter().filter(|e| e.shown == Shows::Cannot).map(|e| e.name).collect();
+        possible().filter(|e| e.shown == Shows::Cannot).map(|e| e.name).collect();
     let what = if cannot.is_empty() {
         "every effect".to_owned()
     } else {
-        format!("{} of {} effects", effects.len() - cannot.len(), effects.len())
+        let all = possible().count();
+        format!("{} of {all} effects", all - cannot.len())
     };
     let flights = if n == 1 { "one flight".to_owned() } else { format!("{n} flights together") };
     let beside =

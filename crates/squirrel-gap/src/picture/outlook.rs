@@ -151,10 +151,7 @@ pub(super) fn remains(verdict: &Verdict) -> Answer {
                 figure_note: "squared error over that of noise, on held-out flights".to_owned(),
                 ..said(format!("{nothing} here, more on held-out flights"), lines)
             },
-            None if lines.is_empty() => said(
-                nothing,
-                vec!["What these flights show, the vehicle file accounts for.".to_owned()],
-            ),
+            None if lines.is_empty() => said(nothing, vec![accounted_for(verdict)]),
             None => said(nothing, lines),
         };
     }
@@ -176,6 +173,18 @@ pub(super) fn remains(verdict: &Verdict) -> Answer {
         figure: format!("{:.0} %", 100.0 * left.share_left),
         figure_note: "of what was measured there, about its mean".to_owned(),
         ..said(format!("A part of {}", channels.join(" and ")), lines)
+    }
+}
+
+/// What accounts for flights in which nothing has a name.
+fn accounted_for(verdict: &Verdict) -> String {
+    match verdict.moved.first() {
+        None => "What these flights show, the vehicle file accounts for.".to_owned(),
+        Some(number) => format!(
+            "The vehicle file accounts for these flights if {} is {:.1} tolerances off; check that number.",
+            number.name,
+            number.far()
+        ),
     }
 }
 

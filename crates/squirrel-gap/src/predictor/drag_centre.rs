@@ -11,10 +11,12 @@ use super::{Hypothesis, Predictor};
 use crate::GapError;
 use nalgebra::Vector3;
 use squirrel_core::effects::{ConstantWind, Effect, Effects, LinearDrag, QuadraticDrag};
-use squirrel_sim::plant::{Plant, SideBySide, WingPlant};
+use squirrel_core::frames::{In, Ned};
+use squirrel_core::vehicle::MAX_ROTORS;
+use squirrel_sim::plant::{Plant, PlantState, SideBySide, WingPlant};
 
 /// Drag that acts elsewhere.
-pub(super) struct DragCentre {
+pub(crate) struct DragCentre {
     at_m: Vector3<f64>,
     /// The vehicle with nothing but its drag: with rotors that stand still no other force is left.
     drag: Plant,
@@ -25,7 +27,7 @@ impl DragCentre {
     ///
     /// # Errors
     /// As [`Predictor::plant_at`].
-    pub(super) fn of(
+    pub(crate) fn of(
         predictor: &Predictor<'_>,
         hypothesis: &Hypothesis,
         dt_s: f64,
@@ -55,5 +57,22 @@ impl DragCentre {
         let led = self.drag.led_at_without_rotors(states);
         let inverse = plant.vehicle().inertia_inverse();
         led.iter().map(|led| inverse * self.at_m.cross(&led.wrench.force.vector)).collect()
+    }
+    /// Turns a plant that flies by itself.
+    ///
+    /// * `wind` - over ground, beside that of effects
+    /// * `dt_s` - how long the state lasts
+    pub(crate) fn turn(
+        &self,
+        plant: &Plant,
+        state: &mut PlantState,
+        wind: In<Ned, f64>,
+        dt_s: f64,
+    ) {
+        let mut still = *state;
+        still.body.rotor_speed_rad_s = [0.0; MAX_ROTORS];
+        let moment = self.at_m.cross(&self.drag.wrench(&still, wind).force.vector);
+        let turning = plant.vehicle().inertia_inverse() * moment;
+        state.body.omega = In::new(state.body.omega.vector + turning * dt_s);
     }
 }

@@ -29,6 +29,7 @@ mod trim;
 mod turning;
 
 pub(crate) use commands::{Clock, Commands};
+pub(crate) use drag_centre::DragCentre;
 pub(crate) use hypothesis::Hypothesis;
 pub(crate) use noise::TURBULENCE_M_S;
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
@@ -37,7 +38,6 @@ use crate::GapError;
 use crate::flight::inertial::Common;
 use crate::flight::recording::Recording;
 use actuators::{KeptPaths, stride};
-use drag_centre::DragCentre;
 use hypothesis::Asked;
 use kept::Kept;
 use led::{States, StatesKey};

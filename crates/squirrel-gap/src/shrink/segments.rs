@@ -4,7 +4,7 @@
 use super::errors::{BINS, COUNTED, Errors12};
 use crate::GapError;
 use crate::leftover::floor::TURBULENCE_S;
-use crate::predictor::{Clock, Hypothesis, Motion, Predictor, Track};
+use crate::predictor::{Clock, DragCentre, Hypothesis, Motion, Predictor, Track};
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -93,6 +93,8 @@ pub(super) struct Segments<'a> {
     pub(super) piece: usize,
     motion: Rc<Motion>,
     plant: Plant,
+    /// Where the frame's drag acts, if elsewhere.
+    drag: Option<DragCentre>,
     /// Of it to a sample.
     steps: usize,
     /// Samples at which they start, and the plant there.
@@ -112,13 +114,14 @@ impl<'a> Segments<'a> {
         let steps = substeps(track.period_s, hypothesis);
         let dt_s = track.period_s / steps as f64;
         let plant = predictor.plant_in(hypothesis, track.flight, dt_s)?;
+        let drag = DragCentre::of(predictor, hypothesis, dt_s)?;
         let per_bin = (BIN_S / track.period_s).round().max(1.0) as usize;
         let stride = (RESTART_S / track.period_s).round().max(1.0) as usize;
         let starts: Vec<usize> =
             (0..n).step_by(stride).skip(1).filter(|s| s + per_bin < n).collect();
         let states = predictor.led_states(&plant, piece, &motion, &starts);
         let starts = starts.into_iter().zip(states).collect();
-        Ok(Self { predictor, hypothesis, piece, motion, plant, steps, starts, per_bin })
+        Ok(Self { predictor, hypothesis, piece, motion, plant, drag, steps, starts, per_bin })
     }
 
     pub(super) fn track(&self) -> &'a Track {
@@ -148,7 +151,7 @@ impl<'a> Segments<'a> {
         noise: &mut Option<Noise<'_>>,
         each: &mut impl FnMut(Bin),
     ) {
-        let Self { predictor, plant, motion, per_bin, .. } = self;
+        let Self { predictor, plant, drag, motion, per_bin, .. } = self;
         let (track, per_bin) = (self.track(), *per_bin);
         let (start, mut state) = self.starts[segment];
         let bins = if segment.is_multiple_of(LONG_EVERY) { BINS } else { COUNTED };
@@ -204,6 +207,9 @@ impl<'a> Segments<'a> {
                 for step in 0..self.steps {
                     let from_s = track.time_s[sample] + step as f64 * plant.dt_s();
                     let (rotor, wing) = clock.mean(from_s, from_s + plant.dt_s());
+                    if let Some(drag) = drag.as_ref().filter(|_| !is_led) {
+                        drag.turn(plant, &mut state, In::new(wind), plant.dt_s());
+                    }
                     plant.step(&mut state, &rotor, wing, In::new(wind));
                 }
                 let slope = (state.body.velocity.vector - before.velocity.vector) / track.period_s;
