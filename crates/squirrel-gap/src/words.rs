@@ -84,6 +84,9 @@ fn with_numbers(effect: &NamedEffect) -> String {
     format!("{} ({})", effect.name, numbers.join("; "))
 }
 
+/// What is said of effects where numbers of the file moved and none has a name.
+const TOO_LITTLE: &str = "No effect has the evidence that a name needs";
+
 /// The verdict in one paragraph.
 ///
 /// * `blind` - effects that these flights do not show
@@ -99,7 +102,7 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool
     };
     let mut text = match verdict.verdict {
         // What moved beyond its tolerance is said below.
-        Kind::None if !verdict.moved.is_empty() => "No effect has the evidence that a name needs.".to_owned(),
+        Kind::None if !verdict.moved.is_empty() => format!("{TOO_LITTLE}."),
         Kind::None => "No effect above its tolerance: what the flights disagree by is what noise and the declared tolerances explain.".to_owned(),
         Kind::Named => format!("{lacks} {effects}."),
         Kind::NamedFormDiffers => format!(
@@ -123,7 +126,7 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool
             if verdict.moved.is_empty() {
                 "Nothing above its tolerance shows"
             } else {
-                "No effect has the evidence that a name needs"
+                TOO_LITTLE
             },
             blind.join(", ")
         ),

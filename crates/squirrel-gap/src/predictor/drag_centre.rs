@@ -11,7 +11,7 @@ use super::{Hypothesis, Predictor};
 use crate::GapError;
 use nalgebra::Vector3;
 use squirrel_core::effects::{ConstantWind, Effect, Effects, LinearDrag, QuadraticDrag};
-use squirrel_core::frames::{In, Ned};
+use squirrel_core::frames::{Body, In, Ned};
 use squirrel_core::vehicle::MAX_ROTORS;
 use squirrel_sim::plant::{Plant, PlantState, SideBySide, WingPlant};
 
@@ -55,10 +55,10 @@ impl DragCentre {
     /// * `plant` - whose inertia the vehicle has
     pub(super) fn turns(&self, plant: &Plant, states: &SideBySide) -> Vec<Vector3<f64>> {
         let led = self.drag.led_at_without_rotors(states);
-        let inverse = plant.vehicle().inertia_inverse();
-        led.iter().map(|led| inverse * self.at_m.cross(&led.wrench.force.vector)).collect()
+        led.iter().map(|led| self.turning(plant, led.wrench.force)).collect()
     }
-    /// Turns a plant that flies by itself.
+
+    /// Turns a plant that flies by itself by what drag adds to it.
     ///
     /// * `wind` - over ground, beside that of effects
     /// * `dt_s` - how long the state lasts
@@ -71,8 +71,11 @@ impl DragCentre {
     ) {
         let mut still = *state;
         still.body.rotor_speed_rad_s = [0.0; MAX_ROTORS];
-        let moment = self.at_m.cross(&self.drag.wrench(&still, wind).force.vector);
-        let turning = plant.vehicle().inertia_inverse() * moment;
+        let turning = self.turning(plant, self.drag.wrench(&still, wind).force);
         state.body.omega = In::new(state.body.omega.vector + turning * dt_s);
+    }
+
+    fn turning(&self, plant: &Plant, drag: In<Body, f64>) -> Vector3<f64> {
+        plant.vehicle().inertia_inverse() * self.at_m.cross(&drag.vector)
     }
 }

@@ -114,7 +114,12 @@ impl<'a> Segments<'a> {
         let steps = substeps(track.period_s, hypothesis);
         let dt_s = track.period_s / steps as f64;
         let plant = predictor.plant_in(hypothesis, track.flight, dt_s)?;
-        let drag = DragCentre::of(predictor, hypothesis, dt_s)?;
+        // Where the attitude is the measured one, nothing turns the plant.
+        let drag = if flies_freely(predictor) {
+            DragCentre::of(predictor, hypothesis, dt_s)?
+        } else {
+            None
+        };
         let per_bin = (BIN_S / track.period_s).round().max(1.0) as usize;
         let stride = (RESTART_S / track.period_s).round().max(1.0) as usize;
         let starts: Vec<usize> =
@@ -207,7 +212,7 @@ impl<'a> Segments<'a> {
                 for step in 0..self.steps {
                     let from_s = track.time_s[sample] + step as f64 * plant.dt_s();
                     let (rotor, wing) = clock.mean(from_s, from_s + plant.dt_s());
-                    if let Some(drag) = drag.as_ref().filter(|_| !is_led) {
+                    if let Some(drag) = drag {
                         drag.turn(plant, &mut state, In::new(wind), plant.dt_s());
                     }
                     plant.step(&mut state, &rotor, wing, In::new(wind));

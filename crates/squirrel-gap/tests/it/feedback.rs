@@ -16,6 +16,11 @@ use squirrel_sim::plant::Plant;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 const FILE: &str = "squirrel.toml";
+/// A drag in the place of none, for vehicle files.
+const DRAG: (&str, &str) = (
+    "linear_n_s_per_m = { value = [0.0, 0.0, 0.0]",
+    "linear_n_s_per_m = { value = [0.25, 0.25, 0.25]",
+);
 const RATE_HZ: f64 = 200.0;
 const FLIGHT_S: f64 = 30.0;
 /// Of attitude, 1/s^2 and 1/s.
@@ -245,10 +250,6 @@ fn a_large_moment_is_no_problem_of_the_data() {
 /// it: what it turns was read into rotors that are elsewhere, and nothing was named.
 #[test]
 fn a_centre_of_mass_is_named_wherever_drag_acts() {
-    let drag = (
-        "linear_n_s_per_m = { value = [0.0, 0.0, 0.0]",
-        "linear_n_s_per_m = { value = [0.25, 0.25, 0.25]",
-    );
     let off = [0.006, -0.008];
     let rotors = [[0.085, -0.085], [-0.085, -0.085], [-0.085, 0.085], [0.085, 0.085]];
     let places = rotors.map(|[x, y]| {
@@ -256,10 +257,10 @@ fn a_centre_of_mass_is_named_wherever_drag_acts() {
         (place(x, y), place(x - off[0], y - off[1]))
     });
     let moved = places.iter().map(|(from, to)| (from.as_str(), to.as_str()));
-    let machine = vehicle_with(FILE, &moved.chain([drag]).collect::<Vec<_>>());
+    let machine = vehicle_with(FILE, &moved.chain([DRAG]).collect::<Vec<_>>());
     let how = Flown { gyro_rad_s: 0.003, heave: 0.05, hold: 0.1, ..Flown::default() };
     let flights = [1, 2, 3].map(|seed| flight(&machine, seed, how));
-    let file = vehicle_with(FILE, &[drag]);
+    let file = vehicle_with(FILE, &[DRAG]);
     let verdict = diagnose(&file, &flights[..2], &flights[2..], &|_| {}).unwrap().verdict;
     println!("{}", verdict.words);
     let names: Vec<_> = verdict.effects.iter().map(|effect| effect.name).collect();
@@ -276,11 +277,7 @@ fn a_centre_of_mass_is_named_wherever_drag_acts() {
 #[test]
 fn held_out_flights_have_drag_where_the_fitted_ones_have_it() {
     const ABOVE_M: f64 = 0.012;
-    let drag = (
-        "linear_n_s_per_m = { value = [0.0, 0.0, 0.0]",
-        "linear_n_s_per_m = { value = [0.25, 0.25, 0.25]",
-    );
-    let file = vehicle_with(FILE, &[drag]);
+    let file = vehicle_with(FILE, &[DRAG]);
     let mut machine = file.clone();
     let mut p = *file.vehicle.parameters();
     p.mass_kg *= 1.08;
