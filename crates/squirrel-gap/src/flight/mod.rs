@@ -1,6 +1,7 @@
 //! A logged flight as the gap workflow sees it: channels as series, a uniform grid, and what was
 //! flown where.
 
+mod density;
 pub(crate) mod filter;
 mod ground;
 pub(crate) mod heading;

@@ -1,6 +1,7 @@
 //! What the residual needs of one flight: its channels, a uniform time grid, and the pieces of it
 //! without gaps.
 
+use super::density::passed_deviation;
 use super::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass};
 use super::ground;
 use super::inertial::{self, ATTITUDE, Common, Derived, Inertial, ROTOR_SPEED, Sources, VELOCITY};
@@ -335,8 +336,8 @@ impl<'a> Recording<'a> {
         let force = self.derived.force.as_ref().map(|from| alike(from.passed(self.cutoff_hz)));
         let rates = self.derived.rates.as_ref().map(|from| alike(from.passed_rate(self.cutoff_hz)));
         [
-            force.unwrap_or_else(|| self.specific_force.white_deviation()),
-            rates.unwrap_or_else(|| self.omega.white_deviation()),
+            force.unwrap_or_else(|| passed_deviation(&self.specific_force)),
+            rates.unwrap_or_else(|| passed_deviation(&self.omega)),
         ]
     }
 
