@@ -218,6 +218,7 @@ fn judged(
 ) -> Result<Diagnosis, GapError> {
     let domain = covered(&ready.predictor);
     let places = find::places(&ready.predictor, &ready.nominal)?;
+    let strays = moments == Moments::All && ready.gyroscope() == Gyroscope::Strays;
     let Ready { mut predictor, nominal, mut unseen } = ready.narrowed(flights, moments)?;
     let has_other_moments = predictor.has_motion() && !predictor.has_channel(3);
     if let Some(unseen) = &mut unseen {
@@ -234,6 +235,9 @@ fn judged(
     let mut catalogue = catalogue(&predictor, &nominal)?;
     if let Some(baseline) = baseline {
         catalogue.take(&baseline.scatter);
+    }
+    if strays {
+        catalogue.hold_gyroscope();
     }
     let tick = || progress("naming");
     let naming = explain_flights(&predictor, &mut catalogue, &tick)?;

@@ -88,8 +88,8 @@ impl<'p> Flight<'p> {
             let Some(attitude) = track.attitude() else { continue };
             let step = (ATTITUDE_WINDOW_S / track.period_s).round().max(1.0) as usize;
             for start in (0..attitude.len().saturating_sub(step)).step_by(step) {
-                let [a, b] =
-                    [start, start + step].map(|k| UnitQuaternion::new_normalize(turn(attitude[k])));
+                let [a, b] = [start, start + step]
+                    .map(|k| UnitQuaternion::new_normalize(turn(attitude[k].into_inner())));
                 let turned = (a.inverse() * b).scaled_axis() / (step as f64 * track.period_s);
                 let gyro =
                     track.omega()[start..start + step].iter().sum::<Vector3<f64>>() / step as f64;
@@ -107,7 +107,7 @@ impl<'p> Flight<'p> {
             let attitude = track.attitude()?;
             let mut velocity = vec![Vector3::zeros()];
             for k in 1..attitude.len() {
-                let a = UnitQuaternion::new_normalize(turn(attitude[k]))
+                let a = UnitQuaternion::new_normalize(turn(attitude[k].into_inner()))
                     * track.specific_force()[k]
                     + gravity;
                 velocity.push(velocity[k - 1] + a * track.period_s);

@@ -72,7 +72,8 @@ impl Search<'_> {
             return Ok(None);
         }
         let of = |hypothesis: &Hypothesis| self.predictor.innovations(hypothesis);
-        let whole = |set| self.hypothesis(&self.whole(set));
+        // A gyroscope's delay goes after that noise, too: all are asked with sensors on time.
+        let whole = |set| Ok::<_, GapError>(self.hypothesis(&self.whole(set))?.on_time());
         let Some(with) = of(&whole(set)?)? else { return Ok(None) };
         let mut least = f64::INFINITY;
         // What floats without it may have gone after the same noise: the file as it is has not.

@@ -4,6 +4,7 @@
 use super::point::{Airframe, WING_PLACE};
 use super::refine::Scored;
 use super::search::{ACTS, Search};
+use crate::predictor::LATE;
 use crate::verdict::Moved;
 use squirrel_core::effects::{Effects, Kind};
 
@@ -40,6 +41,7 @@ impl Search<'_> {
                 Airframe::Drag { axis } => format!("drag.linear_n_s_per_m[{axis}]"),
                 Airframe::Wing { axis } => WING_PLACE[axis].to_owned(),
                 Airframe::DragCentre { axis } => format!("drag.centre_body_m[{axis}]"),
+                Airframe::Late { sensor } => LATE[sensor].to_owned(),
             };
         };
         let candidate = &self.catalogue.candidates[parameter.candidate];

@@ -9,7 +9,7 @@
 use super::parameters::{Candidate, Catalogue};
 use crate::GapError;
 use crate::leftover::Usual;
-use crate::predictor::{HEIGHT_KNOTS, Hypothesis, Predictor};
+use crate::predictor::{GYROSCOPE, HEIGHT_KNOTS, Hypothesis, Predictor};
 use nalgebra::Vector3;
 use squirrel_core::effects::{
     Declared, Effect, EffectParameter, Effects, Tolerance, WingAsymmetry, WingMembrane,
@@ -69,7 +69,7 @@ pub(crate) struct Point {
     pub(crate) base: Vec<f64>,
 }
 
-/// A number of the airframe that no effect changes by itself.
+/// A number of the airframe, or of how its sensors are read, that no effect changes by itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Airframe {
     /// Place of a rotor along an axis, m.
@@ -83,6 +83,9 @@ pub(crate) enum Airframe {
     Wing { axis: usize },
     /// Where the frame's drag acts along an axis, m.
     DragCentre { axis: usize },
+    /// How late a sensor reads, s, by its place in [`LATE`](crate::predictor::LATE): the filters of
+    /// an autopilot are the same in each of its flights.
+    Late { sensor: usize },
 }
 
 impl Airframe {
@@ -100,6 +103,12 @@ impl Airframe {
             Self::Wing { axis } => with_wing_off(vehicle, axis, x),
             Self::DragCentre { axis } => {
                 on.drag_centre_m[axis] += x;
+                return;
+            }
+            Self::Late { sensor } => {
+                for errors in &mut on.errors {
+                    errors.late_s[sensor] += x;
+                }
                 return;
             }
         };
@@ -292,7 +301,10 @@ impl Catalogue {
                 .then_some((self.candidates[parameter.candidate].effect, parameter.smallest));
         }
         match self.airframe.get(column - self.parameters.len())?.0 {
-            Airframe::Arm { .. } | Airframe::Wing { .. } | Airframe::DragCentre { .. } => None,
+            Airframe::Arm { .. }
+            | Airframe::Wing { .. }
+            | Airframe::DragCentre { .. }
+            | Airframe::Late { .. } => None,
             Airframe::Torque { .. } => Some((behind(Declared::Torque)?, TORQUE_FRACTION)),
             Airframe::Drag { .. } => {
                 let drag = self.parameters.iter().find(|p| p.is_behind(Declared::LinearDrag(0)))?;
@@ -320,7 +332,10 @@ impl Catalogue {
         self.is_of_one_machine = true;
         self.usual = scatter.usual;
         for (number, tolerance) in &mut self.airframe {
-            if !matches!(number, Airframe::Torque { .. } | Airframe::Drag { .. }) {
+            if matches!(
+                number,
+                Airframe::Arm { .. } | Airframe::Wing { .. } | Airframe::DragCentre { .. }
+            ) {
                 *tolerance = 0.0;
             }
         }
@@ -332,6 +347,16 @@ impl Catalogue {
             match self.parameters.get_mut(column) {
                 Some(parameter) => (parameter.tolerance, parameter.spread) = (*sd, *sd),
                 None => self.airframe[column - self.parameters.len()].1 = *sd,
+            }
+        }
+    }
+
+    /// Takes the gyroscope to be on time: where its noise is most of what is quick, a controller
+    /// that feeds it back makes commands of it, and a delay that is not there fits that.
+    pub(crate) fn hold_gyroscope(&mut self) {
+        for (number, tolerance) in &mut self.airframe {
+            if *number == (Airframe::Late { sensor: GYROSCOPE }) {
+                *tolerance = 0.0;
             }
         }
     }

@@ -24,6 +24,10 @@ const GYRO_SCALE: (&str, f64) = ("sensors.imu.gyro_scale_sd", 0.01);
 const ACCEL_SCALE: (&str, f64) = ("sensors.imu.accel_scale_sd", 0.003);
 const HEADING: (&str, f64, &str) = ("sensors.attitude.bias_rad", 1.25_f64.to_radians(), "rad");
 
+/// How late a log has its gyroscope and its accelerometer, one standard deviation, s: autopilots
+/// filter both with corners from 30 to 80 Hz, which is 7.5 to 2.8 ms.
+const LATE_S: f64 = 0.004;
+
 /// What the vehicle file does not say and is taken instead.
 pub(crate) fn notes(vehicle: &VehicleFile) -> Vec<String> {
     let silent = |field: &str| sds(vehicle, field).is_none();
@@ -247,6 +251,10 @@ pub(super) fn airframe(predictor: &Predictor) -> Vec<(Airframe, f64)> {
             );
         }
     }
+    let late =
+        [predictor.has_channel(3) && predictor.has_gyroscope(), predictor.has_accelerometer()];
+    let sensors = late.iter().enumerate().filter(|(_, is_there)| **is_there);
+    all.extend(sensors.map(|(sensor, _)| (Airframe::Late { sensor }, LATE_S)));
     if p.wing.is_some() {
         for (axis, field) in WING_PLACE.iter().enumerate() {
             all.extend(sds(vehicle, field).map(|sd| (Airframe::Wing { axis }, sd[0])));

@@ -1,6 +1,7 @@
 //! What is assumed of the vehicle and its sensors while flights are predicted.
 
 use super::SensorErrors;
+use super::late::LateS;
 use nalgebra::Vector3;
 use squirrel_core::effects::{Effect, Effects, ThrustCoefficient};
 use squirrel_core::vehicle::Vehicle;
@@ -28,6 +29,14 @@ impl Hypothesis {
             thrust: self.thrust.get(flight).copied().unwrap_or(0.0),
             drag_centre_m: self.drag_centre_m,
         }
+    }
+
+    /// The same with sensors that are not late.
+    pub(crate) fn on_time(mut self) -> Self {
+        for errors in &mut self.errors {
+            errors.late_s = LateS::default();
+        }
+        self
     }
 
     /// The same with the vehicle as it was in one flight.

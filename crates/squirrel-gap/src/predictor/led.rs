@@ -6,6 +6,7 @@
 
 use super::actuators::{Path, Paths};
 use super::drag_centre::DragCentre;
+use super::late::delayed;
 use super::{Motion, Predictor, Track};
 use nalgebra::{Vector3, Vector6};
 use squirrel_core::effects::Pendulum;
@@ -138,7 +139,7 @@ impl Predictor<'_> {
             let a = (led.angular_acceleration.vector + turned).component_mul(&rate_scale);
             Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z)
         });
-        shown.collect()
+        delayed(shown.collect(), motion.late_s, path.stride as f64 * track.period_s)
     }
 
     /// The plant's state at some samples of a piece, in order: led there along the measured motion.

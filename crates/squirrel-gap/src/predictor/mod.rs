@@ -20,6 +20,8 @@ mod drag_centre;
 mod hypothesis;
 mod innovations;
 mod kept;
+mod late;
+mod leaning;
 mod led;
 mod noise;
 mod slope;
@@ -31,6 +33,7 @@ mod turning;
 pub(crate) use commands::{Clock, Commands};
 pub(crate) use drag_centre::DragCentre;
 pub(crate) use hypothesis::Hypothesis;
+pub(crate) use late::{ACCELEROMETER, GYROSCOPE, LATE};
 pub(crate) use noise::TURBULENCE_M_S;
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 

@@ -10,6 +10,8 @@
 //! show there, forces that the model lacks do not. The third is what a gyroscope says of turns
 //! against the attitude ([`turning`](super::turning)).
 
+use super::late::{ACCELEROMETER, GYROSCOPE, LateS, later};
+use super::leaning::Leaning;
 use super::turning::Turning;
 use crate::flight::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass, derivative, model_stride};
 use crate::flight::inertial::Derived;
@@ -47,6 +49,8 @@ pub(crate) struct SensorErrors {
     pub(crate) levelling_rad_s2_per_m: f64,
     /// What the barometer reads too high, m, on lines between the knots of the flight.
     pub(crate) height_m: [f64; HEIGHT_KNOTS],
+    /// How late the sensors read, s.
+    pub(crate) late_s: LateS,
     /// By how much the velocity through the air is less than that over ground, m/s: moving air, or
     /// an error of velocity.
     pub(crate) air_ned_m_s: [f64; 3],
@@ -77,7 +81,7 @@ pub(crate) struct Track {
     pub(crate) measured: Vec<Vector6<f64>>,
     specific_force: Vec<Vector3<f64>>,
     omega: Vec<Vector3<f64>>,
-    attitude: Option<Vec<Quaternion<f64>>>,
+    attitude: Option<Vec<UnitQuaternion<f64>>>,
     velocity: Vec<(f64, Vector3<f64>)>,
     position: Vec<(f64, Vector3<f64>)>,
     altitude_m: Vec<(f64, f64)>,
@@ -98,6 +102,8 @@ pub(crate) struct Motion {
     pub(crate) kinematic: Vec<(f64, Vector3<f64>)>,
     /// Rate by the attitude minus rate by the gyroscope, rad/s, about its mean.
     pub(crate) turning: Vec<Vector3<f64>>,
+    /// How late the sensors read, s.
+    pub(crate) late_s: LateS,
 }
 
 impl Track {
@@ -177,7 +183,7 @@ impl Track {
             omega,
             attitude: recording
                 .has_attitude()
-                .then(|| samples.iter().map(|s| s.body.attitude).collect()),
+                .then(|| samples.iter().map(|s| s.body.ned_from_body().quaternion).collect()),
             velocity: vectors(recording.velocity.as_ref()),
             position,
             altitude_m,
@@ -259,8 +265,7 @@ impl Track {
         let lag = (ATTITUDE_LAG_S / self.period_s).round().max(1.0) as usize;
         let (mut square, mut n) = (Vector3::zeros(), 0.0);
         for start in (0..attitude.len().saturating_sub(lag)).step_by(lag) {
-            let [from, to] =
-                [start, start + lag].map(|k| UnitQuaternion::new_unchecked(attitude[k]));
+            let [from, to] = [start, start + lag].map(|k| attitude[k]);
             let turned = (start..start + lag).fold(UnitQuaternion::identity(), |q, k| {
                 // The mean of two samples is the rate between them.
                 q * UnitQuaternion::from_scaled_axis(
@@ -284,7 +289,7 @@ impl Track {
         &self.altitude_m
     }
     /// Measured attitudes on the grid, body to NED, if logged.
-    pub(crate) fn attitude(&self) -> Option<&[Quaternion<f64>]> {
+    pub(crate) fn attitude(&self) -> Option<&[UnitQuaternion<f64>]> {
         self.attitude.as_deref()
     }
 
@@ -292,11 +297,15 @@ impl Track {
     pub(crate) fn motion(&self, effects: &Effects<f64>, errors: &SensorErrors) -> Motion {
         let n = self.time_s.len();
         let [rate_scale, force_scale] = self.scales(effects);
+        // How many samples on each sensor reads what is true now.
+        let late_s = errors.late_s;
+        let late = late_s.map(|late_s| late_s / self.period_s);
+        let force = |k: usize| later(&self.specific_force, k, late[ACCELEROMETER]);
         let at = |k: usize, velocity, position, attitude| State {
             position: In::new(position),
             velocity: In::new(velocity),
             attitude,
-            omega: In::new(self.omega[k].component_div(&rate_scale)),
+            omega: In::new(later(&self.omega, k, late[GYROSCOPE]).component_div(&rate_scale)),
             ..State::at_rest()
         };
         let Some(attitude) = &self.attitude else {
@@ -305,18 +314,17 @@ impl Track {
                 body: (0..n).map(still).collect(),
                 kinematic: Vec::new(),
                 turning: Vec::new(),
+                late_s,
             };
         };
         let [north, east] = errors.tilt_rad;
         let tilt = UnitQuaternion::from_scaled_axis(Vector3::new(-north, -east, 0.0));
         let mut leaning = Leaning::new(errors.levelling_rad_s2_per_m, self.period_s);
-        let attitude: Vec<UnitQuaternion<f64>> = attitude
-            .iter()
-            .zip(self.time_s.iter().zip(&self.specific_force))
-            .zip(&self.rotor_load)
-            .map(|((q, (t, force)), load)| {
-                let heading = effects.heading_bias_rad(t - self.began_s, *load);
-                let turned = leaning.upright(UnitQuaternion::new_unchecked(*q), force);
+        let attitude: Vec<UnitQuaternion<f64>> = (0..n)
+            .map(|k| {
+                let since_s = self.time_s[k] - self.began_s;
+                let heading = effects.heading_bias_rad(since_s, self.rotor_load[k]);
+                let turned = leaning.upright(attitude[k], &force(k));
                 if heading == 0.0 && errors.tilt_rad == [0.0; 2] {
                     turned
                 } else {
@@ -329,7 +337,7 @@ impl Track {
         let gravity = Vector3::new(0.0, 0.0, GRAVITY_M_S2);
         let acceleration = |k: usize| {
             let bias = self.bias(effects, self.time_s[k] - self.began_s);
-            attitude[k] * (self.specific_force[k] - bias).component_div(&force_scale) + gravity
+            attitude[k] * (force(k) - bias).component_div(&force_scale) + gravity
         };
         let mut strapdown = Vec::with_capacity(n);
         let (mut velocity, mut before) = (Vector3::zeros(), acceleration(0));
@@ -378,7 +386,7 @@ impl Track {
             .turning
             .as_ref()
             .map_or_else(Vec::new, |turning| turning.rows(&attitude, &rate_scale));
-        Motion { body, kinematic, turning }
+        Motion { body, kinematic, turning, late_s }
     }
 
     /// What gyroscope and accelerometer read of the truth, by axis; 1 where there is none.
@@ -417,8 +425,7 @@ impl Track {
     ) -> Vector3<f64> {
         match &self.attitude {
             Some(measured) if !self.is_felt() => {
-                let [measured, own] =
-                    [measured[k], motion.body[k].attitude].map(UnitQuaternion::new_unchecked);
+                let (measured, own) = (measured[k], motion.body[k].ned_from_body().quaternion);
                 let bias = effects.specific_force_bias(self.time_s[k] - self.began_s).vector;
                 let scale = effects.accel_scale().vector.add_scalar(1.0);
                 (measured.inverse() * own) * (force - bias).component_div(&scale)
@@ -481,38 +488,6 @@ fn rotor_load(
         vehicle.vehicle.rotor_load(speed)
     });
     along.collect()
-}
-
-/// Time over which a filter of attitude trusts its gyroscope, s.
-const LEVELLING_S: f64 = 1.5;
-
-/// How an attitude estimate leans into an acceleration: in proportion, behind a lag.
-struct Leaning {
-    gain: f64,
-    keep: f64,
-    acceleration: Vector3<f64>,
-}
-
-impl Leaning {
-    fn new(gain: f64, period_s: f64) -> Self {
-        Self { gain, keep: (-period_s / LEVELLING_S).exp(), acceleration: Vector3::zeros() }
-    }
-
-    /// The attitude without its lean: one sample on.
-    fn upright(
-        &mut self,
-        attitude: UnitQuaternion<f64>,
-        force: &Vector3<f64>,
-    ) -> UnitQuaternion<f64> {
-        if self.gain == 0.0 {
-            return attitude;
-        }
-        let now = attitude * force;
-        self.acceleration +=
-            (Vector3::new(now.x, now.y, 0.0) - self.acceleration) * (1.0 - self.keep);
-        let a = self.acceleration;
-        UnitQuaternion::from_scaled_axis(Vector3::new(-a.y, a.x, 0.0) * self.gain) * attitude
-    }
 }
 
 /// Where the barometer's error is asked for: spread over the time that a flight is low, or over all

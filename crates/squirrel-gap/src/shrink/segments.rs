@@ -4,7 +4,9 @@
 use super::errors::{BINS, COUNTED, Errors12};
 use crate::GapError;
 use crate::leftover::floor::TURBULENCE_S;
-use crate::predictor::{Clock, DragCentre, Hypothesis, Motion, Predictor, Track};
+use crate::predictor::{
+    ACCELEROMETER, Clock, DragCentre, GYROSCOPE, Hypothesis, Motion, Predictor, Track,
+};
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -187,6 +189,7 @@ impl<'a> Segments<'a> {
         let gravity = Vector3::new(0.0, 0.0, GRAVITY_M_S2);
         let keep = (-track.period_s / TURBULENCE_S).exp();
         let [rate_scale, force_scale] = track.scales(effects);
+        let late_s = motion.late_s;
         for bin in 0..bins {
             let first = start + bin * per_bin;
             let (last, half) = (first + per_bin, first + per_bin / 2);
@@ -196,7 +199,8 @@ impl<'a> Segments<'a> {
             let (mut velocity, mut rate, mut force) =
                 (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
             let mut middle = state.body.ned_from_body().quaternion;
-            let began = state.body.velocity.vector;
+            let (began, began_rate) = (state.body.velocity.vector, state.body.omega.vector);
+            let (mut force_now, mut began_force) = (Vector3::zeros(), Vector3::zeros());
             for sample in first..last {
                 if sample == half {
                     middle = state.body.ned_from_body().quaternion;
@@ -218,7 +222,11 @@ impl<'a> Segments<'a> {
                     plant.step(&mut state, &rotor, wing, In::new(wind));
                 }
                 let slope = (state.body.velocity.vector - before.velocity.vector) / track.period_s;
-                force += before.ned_from_body().quaternion.inverse() * (slope - gravity);
+                force_now = before.ned_from_body().quaternion.inverse() * (slope - gravity);
+                if sample == first {
+                    began_force = force_now;
+                }
+                force += force_now;
                 if let Some(noise) = noise {
                     let fresh: Vector3<f64> =
                         Vector3::from_fn(|_, _| StandardNormal.sample(noise.rng));
@@ -229,6 +237,10 @@ impl<'a> Segments<'a> {
             let time_s = track.time_s[half] - track.began_s;
             let heading = effects.heading_bias_rad(time_s, track.rotor_load[half]);
             let heading = UnitQuaternion::from_scaled_axis(Vector3::z() * heading);
+            // What a late sensor says was true before: a share of the bin's change.
+            let late = late_s.map(|late_s| late_s / (samples * track.period_s));
+            rate -= (state.body.omega.vector - began_rate) * (samples * late[GYROSCOPE]);
+            force -= (force_now - began_force) * (samples * late[ACCELEROMETER]);
             let read = Reading {
                 velocity_ned: velocity / samples,
                 attitude: heading * middle,
@@ -265,7 +277,7 @@ impl<'a> Segments<'a> {
         let n = (until - from) as f64;
         let velocity = fixes[from..until].iter().map(|(_, v)| v).sum::<Vector3<f64>>() / n;
         let at = fixes[from..until].iter().map(|(t, _)| t - latency_s).sum::<f64>() / n;
-        let q = UnitQuaternion::new_unchecked(measured_attitude[usize::midpoint(*first, *last)]);
+        let q = measured_attitude[usize::midpoint(*first, *last)];
         let mean = |v: &[Vector3<f64>]| {
             v[*first..*last].iter().sum::<Vector3<f64>>() / (last - first) as f64
         };
