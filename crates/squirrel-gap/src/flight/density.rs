@@ -4,8 +4,8 @@
 //! ```text
 //! sigma = sqrt(P(14 .. 24 Hz) rate / 2)      P: density, median over windows and bins / ln 2
 //! ```
-//! Where the density falls by more than a half from a quarter of the rate to its end, the log is
-//! filtered; the noise is then that just above what rotors can do, as if it were white. Medians keep
+//! Where the density at the end of the band is less than three quarters of that at a quarter of the
+//! rate, the log is filtered; the noise is then that just above what rotors can do, as if it were white. Medians keep
 //! lines that propellers shake, and motion of short duration, out of it (Welch, 1967; the median of
 //! an exponential distribution is its mean times ln 2).
 
@@ -22,8 +22,10 @@ const MIDDLE: Range<f64> = 0.2..0.28;
 const END: Range<f64> = 0.4..0.48;
 /// A log with fewer samples a second has no room for these bands, Hz.
 const RATE_MIN_HZ: f64 = 120.0;
+/// Windows that are enough for a median; of more, every so many is read.
+const WINDOWS: usize = 600;
 /// Part of the density that is left at the end of a log that is filtered, at most.
-const FALLS_TO: f64 = 0.5;
+const FALLS_TO: f64 = 0.75;
 
 /// White noise, one standard deviation of a sample, that is as large as the sensor's where it passes
 /// the residual's filter.
@@ -60,6 +62,7 @@ fn density(rows: &[Vector3<f64>], rate_hz: f64, band_hz: Range<f64>) -> Option<V
     let hann = |k: usize| 0.5 - 0.5 * (TAU * (k as f64 + 0.5) / length as f64).cos();
     let scale = 2.0 / (rate_hz * (0..length).map(|k| hann(k).powi(2)).sum::<f64>());
     let bins = (band_hz.start * WINDOW_S).ceil() as usize..=(band_hz.end * WINDOW_S) as usize;
+    let every = (rows.len() / length / WINDOWS).max(1);
     let mut powers: [Vec<f64>; 3] = Default::default();
     for bin in bins {
         let wave: Vec<[f64; 2]> = (0..length)
@@ -68,7 +71,7 @@ fn density(rows: &[Vector3<f64>], rate_hz: f64, band_hz: Range<f64>) -> Option<V
                 [hann(k) * cos, hann(k) * sin]
             })
             .collect();
-        for window in rows.chunks_exact(length) {
+        for window in rows.chunks_exact(length).step_by(every) {
             let mean = window.iter().sum::<Vector3<f64>>() / length as f64;
             let (mut re, mut im) = (Vector3::zeros(), Vector3::zeros());
             for (x, [cos, sin]) in window.iter().zip(&wave) {

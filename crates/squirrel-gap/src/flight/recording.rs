@@ -39,6 +39,9 @@ pub(crate) struct Recording<'a> {
     pub(crate) filter: LowPass,
     /// Where every channel exists for longer than the filter has edges.
     pub(crate) pieces: Vec<Span>,
+    /// White noise of the accelerometer, m/s^2, and of the gyroscope, rad/s, one standard
+    /// deviation.
+    pub(crate) imu_noise: [Vector3<f64>; 2],
     /// What the log lacks, and what was taken instead.
     pub(crate) notes: Vec<String>,
     pub(crate) rotor: Series,
@@ -173,11 +176,13 @@ impl<'a> Recording<'a> {
             let (flight, channel) = (flight.to_owned(), specific_force.channel);
             return Err(GapError::Rate { flight, channel, rate_hz, least_hz: RATE_MIN_HZ });
         }
+        let imu_noise = noise_of(&derived, cutoff_hz, [&specific_force, &omega]);
         let mut recording = Self {
             flight,
             period_s,
             cutoff_hz,
             derived,
+            imu_noise,
             filter: LowPass::new(rate_hz, cutoff_hz),
             pieces: vec![(f64::NEG_INFINITY, f64::INFINITY)],
             notes,
@@ -328,19 +333,6 @@ impl<'a> Recording<'a> {
         command
     }
 
-    /// White noise of the accelerometer, m/s^2, and of the gyroscope, rad/s, one standard
-    /// deviation.
-    pub(crate) fn imu_noise(&self) -> [Vector3<f64>; 2] {
-        // Behind the filter nothing is white; what is left of the noise is as large.
-        let alike = |noise| Vector3::repeat(noise);
-        let force = self.derived.force.as_ref().map(|from| alike(from.passed(self.cutoff_hz)));
-        let rates = self.derived.rates.as_ref().map(|from| alike(from.passed_rate(self.cutoff_hz)));
-        [
-            force.unwrap_or_else(|| passed_deviation(&self.specific_force)),
-            rates.unwrap_or_else(|| passed_deviation(&self.omega)),
-        ]
-    }
-
     /// Whether the log has an attitude.
     pub(crate) fn has_attitude(&self) -> bool {
         self.attitude.is_some()
@@ -349,4 +341,15 @@ impl<'a> Recording<'a> {
     pub(crate) fn has_voltage(&self) -> bool {
         self.voltage.is_some()
     }
+}
+
+/// White noise of accelerometer and gyroscope, one standard deviation.
+fn noise_of(derived: &Derived, cutoff_hz: f64, [force, omega]: [&Series; 2]) -> [Vector3<f64>; 2] {
+    // Behind the filter nothing is white; what is left of the noise is as large.
+    let of_force = derived.force.as_ref().map(|from| from.passed(cutoff_hz));
+    let of_rates = derived.rates.as_ref().map(|from| from.passed_rate(cutoff_hz));
+    [
+        of_force.map_or_else(|| passed_deviation(force), Vector3::repeat),
+        of_rates.map_or_else(|| passed_deviation(omega), Vector3::repeat),
+    ]
 }

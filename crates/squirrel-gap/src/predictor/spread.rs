@@ -55,7 +55,7 @@ fn movement(recording: &Recording<'_>, (start_s, end_s): Span) -> f64 {
     /// Often enough for how much, s.
     const STEP_S: f64 = 0.05;
     let [force_noise, rate_noise] =
-        recording.imu_noise().map(|noise| noise.norm_squared().max(1e-12));
+        recording.imu_noise.map(|noise| noise.norm_squared().max(1e-12));
     let n = ((end_s - start_s) / STEP_S).max(1.0) as usize;
     let samples = (0..n).map(|i| recording.sample(start_s + i as f64 * STEP_S));
     let (force, rate): (Vec<_>, Vec<_>) =

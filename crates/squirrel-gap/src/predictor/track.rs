@@ -169,7 +169,7 @@ impl Track {
             period_s,
             began_s: recording.pieces[0].0,
             has_voltage: recording.has_voltage(),
-            imu_noise: recording.imu_noise(),
+            imu_noise: recording.imu_noise,
             every,
             derived,
             cutoff_hz,
