@@ -30,9 +30,9 @@ pub(crate) struct Scatter {
 
 /// Tolerance of the tilt of an attitude estimate, rad.
 const TILT_RAD: f64 = 0.006;
-/// By how much an attitude estimate may lean into an acceleration that lasts, rad per m/s^2: a
-/// degree at two of them.
-const LEVELLING_RAD_S2_PER_M: f64 = 0.01;
+/// By how much an attitude estimate may lean into an acceleration that lasts, rad per m/s^2, by each
+/// of two lags: together a degree at two m/s^2.
+const LEVELLING_RAD_S2_PER_M: f64 = 0.007;
 /// By how much thrust differs from one flight to the next, as a fraction.
 pub(super) const DAY_FRACTION: f64 = 0.0015;
 /// Smallest change of one rotor's torque that is worth reporting, as a fraction: its thrust shows
@@ -42,8 +42,9 @@ const TORQUE_FRACTION: f64 = 0.03;
 const FREE_TORQUE_FRACTION: f64 = 0.2;
 /// Tolerance of the barometer's zero, m.
 const HEIGHT_M: f64 = 0.2;
-/// Numbers of a flight before its heights: tilt about north and east, levelling, thrust.
-const SHORT: usize = 4;
+/// Numbers of a flight before its heights: tilt about north and east, levelling by a short
+/// and a long lag, thrust.
+const SHORT: usize = 5;
 /// All of them.
 const OF_A_FLIGHT: usize = SHORT + HEIGHT_KNOTS;
 
@@ -222,8 +223,8 @@ pub(crate) fn hypothesis(
     let flights = others[catalogue.airframe.len()..].chunks_exact(OF_A_FLIGHT);
     for ((errors, thrust), x) in all.errors.iter_mut().zip(&mut all.thrust).zip(flights) {
         errors.tilt_rad = [x[0], x[1]];
-        errors.levelling_rad_s2_per_m = x[2];
-        *thrust = x[3];
+        errors.levelling_rad_s2_per_m = [x[2], x[3]];
+        *thrust = x[4];
         errors.height_m.copy_from_slice(&x[SHORT..]);
     }
     Ok(all)
@@ -277,8 +278,8 @@ impl Catalogue {
         let flight = sensor / OF_A_FLIGHT;
         match sensor % OF_A_FLIGHT {
             0 | 1 => (Other::Flight { flight, is_thrust: false }, TILT_RAD),
-            2 => (Other::Flight { flight, is_thrust: false }, LEVELLING_RAD_S2_PER_M),
-            3 => (Other::Flight { flight, is_thrust: true }, self.day_fraction),
+            2 | 3 => (Other::Flight { flight, is_thrust: false }, LEVELLING_RAD_S2_PER_M),
+            4 => (Other::Flight { flight, is_thrust: true }, self.day_fraction),
             _ => (Other::Height { flight }, HEIGHT_M),
         }
     }

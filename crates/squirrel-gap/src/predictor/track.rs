@@ -46,7 +46,7 @@ pub(crate) struct SensorErrors {
     pub(crate) tilt_rad: [f64; 2],
     /// By how much an attitude estimate leans into an acceleration that lasts, rad per m/s^2: a
     /// filter that takes the accelerometer for the vertical.
-    pub(crate) levelling_rad_s2_per_m: f64,
+    pub(crate) levelling_rad_s2_per_m: [f64; 2],
     /// What the barometer reads too high, m, on lines between the knots of the flight.
     pub(crate) height_m: [f64; HEIGHT_KNOTS],
     /// How late the sensors read, s.
