@@ -5,8 +5,8 @@
 //! through the air, `k` with all at hover; see [`at_rotors`](super::at_rotors).
 
 use super::{
-    Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Slopes, Words, absent,
-    is,
+    Acts, Declared, Effect, EffectParameter, Forms, Mimic, Scale, Shown, Situation, Slopes, Words,
+    absent, is,
 };
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
@@ -37,6 +37,7 @@ impl<T: Real> Effect<T> for FlappingMoment<T> {
     };
     const SHOWN: Shown = Shown::MOMENTS.and(Shown::LASTING);
     const IS_OF_MOMENTS: bool = true;
+    const MIMIC: Mimic = Mimic::DragElsewhere;
     const AT_ROTORS: Option<usize> = Some(2);
 
     fn at_rotors(&self, _vehicle: &Vehicle<T>) -> Slopes<T> {

@@ -95,7 +95,7 @@ pub enum Fitted {
     Never,
 }
 
-/// What is no effect and makes the same as one in flights, so that the effect needs more evidence.
+/// What is no effect and makes the same as one in flights, so that the effect has to stand beside it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mimic {
     /// Nothing in particular.
@@ -104,6 +104,8 @@ pub enum Mimic {
     Gusts,
     /// An attitude estimate that leans into accelerations.
     LeaningAttitude,
+    /// Drag that acts beside the centre of mass.
+    DragElsewhere,
 }
 
 /// A ratio that flights show, where they do not show its two sides: of two effects on it one is

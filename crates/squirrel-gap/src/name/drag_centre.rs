@@ -8,11 +8,12 @@
 use super::column::Column;
 use super::day::explain_thrusts;
 use super::evidence::BETA;
-use super::point::Airframe;
+use super::point::{Airframe, Member};
 use super::refine::extended;
 use super::{Catalogue, Naming, Search};
 use crate::GapError;
 use crate::predictor::{DYNAMIC, Predictor};
+use squirrel_core::effects::Mimic;
 
 /// How far from the middle it may be along an axis, one standard deviation, over the arm.
 const SD_OF_ARM: f64 = 0.05;
@@ -40,12 +41,11 @@ pub(super) fn explain_wherever(
         return Ok(naming);
     }
     let sd_m = SD_OF_ARM * predictor.arm_m();
-    let named = naming.found.best.members.len();
-    let asked = Search { predictor, catalogue, gust_m_s: None, progress }
-        .worth_of_drag_centre(&naming, sd_m)?
-        >= WORTH_NATS;
+    let search = Search { predictor, catalogue, gust_m_s: None, progress };
+    let asked = search.worth_of_drag_centre(&naming, sd_m)? >= WORTH_NATS;
     // Two names may be the way around one.
-    if !asked && named < 2 {
+    let named = &naming.found.best.members;
+    if !asked && named.len() < 2 && !search.turns_as_drag_does(named) {
         return Ok(naming);
     }
     let held = catalogue.airframe.len();
@@ -63,10 +63,18 @@ pub(super) fn explain_wherever(
 }
 
 impl Search<'_> {
+    /// Whether one of the members is a moment that goes with velocity, as that of drag beside the
+    /// centre of mass does.
+    fn turns_as_drag_does(&self, members: &[Member]) -> bool {
+        members.iter().any(|member| self.profile(member).mimic == Mimic::DragElsewhere)
+    }
+
     /// Whether an explanation with drag elsewhere is worth it beside one with drag in the middle.
     fn leads_one_in_the_middle(&self, own: &Naming, other: &Naming) -> Result<bool, GapError> {
         let (best, rival) = (&own.found.best, &other.found.best);
-        if best.members.len() >= rival.members.len() {
+        let fewer = best.members.len() < rival.members.len();
+        let as_many = best.members.len() == rival.members.len();
+        if !fewer && !(as_many && self.turns_as_drag_does(&best.members)) {
             return Ok(false);
         }
         let rival = self.score(&own.found.linear, &rival.members)?;

@@ -328,29 +328,58 @@ fn a_centre_of_mass_is_named_wherever_drag_acts() {
     }
 }
 
-/// Drag acts above the centre of mass here, as that of rotors does, and not there, as the file has
-/// it. The fitted flights know; flown without that, the held-out ones lacked "something else".
-#[test]
-fn held_out_flights_have_drag_where_the_fitted_ones_have_it() {
-    const ABOVE_M: f64 = 0.012;
-    let file = vehicle_with(FILE, &[DRAG]);
+/// A machine on which drag acts this far above the centre of mass, as that of rotors does, and not
+/// there, as its file has it.
+fn with_drag_above(file: &VehicleFile, above_m: f64, mass: f64) -> VehicleFile {
     let mut machine = file.clone();
     let mut p = *file.vehicle.parameters();
-    p.mass_kg *= 1.08;
+    p.mass_kg *= mass;
     // Everything but the point that drag acts on is lower.
     for rotor in &mut p.rotors[..p.rotor_count] {
-        rotor.position.vector.z += ABOVE_M;
+        rotor.position.vector.z += above_m;
     }
     machine.vehicle = Vehicle::new(p).unwrap();
     let values = machine.effects.insert(CgOffset::<f64>::NAME).unwrap().values;
-    values.copy_from_slice(&[0.0, 0.0, ABOVE_M, 1.0]);
-    let how = Flown { gyro_rad_s: 0.001, heave: 0.1, hold: 0.0, shake: [10.0, 0.1] };
-    let flights = [1, 2, 3].map(|seed| flight(&machine, seed, how));
-    let verdict = diagnose(&file, &flights[..2], &flights[2..], &|_| {}).unwrap().verdict;
-    println!("{}", verdict.words);
+    values.copy_from_slice(&[0.0, 0.0, above_m, 1.0]);
+    machine
+}
+
+/// The fitted flights know where drag acts; flown without that, the held-out ones lacked "something
+/// else".
+#[test]
+fn held_out_flights_have_drag_where_the_fitted_ones_have_it() {
+    let file = vehicle_with(FILE, &[DRAG]);
+    let machine = with_drag_above(&file, 0.012, 1.08);
+    let verdict = verdict_of(&file, &machine);
     let names: Vec<_> = verdict.effects.iter().map(|effect| effect.name).collect();
     assert_eq!((verdict.verdict, names), (Kind::Named, vec!["mass_error"]), "{}", verdict.words);
     assert!(verdict.moved.iter().any(|moved| moved.name == "drag.centre_body_m[2]"));
     let gap = verdict.gap.unwrap();
     assert!(gap.removed_fraction > 0.9, "{gap:?}");
+}
+
+/// Its moment goes with velocity, as that of flapping blades does.
+#[test]
+fn drag_above_the_centre_of_mass_is_no_flapping() {
+    const GAIN_N_M_S_PER_M: f64 = 0.004;
+    let file = vehicle_with(FILE, &[DRAG]);
+    let mut machine = with_drag_above(&file, 0.012, 1.0);
+    let verdict = verdict_of(&file, &machine);
+    assert!(verdict.effects.is_empty(), "{}", verdict.words);
+    machine.effects.insert("flapping_moment").unwrap().values[0] = GAIN_N_M_S_PER_M;
+    let verdict = verdict_of(&file, &machine);
+    let names: Vec<_> = verdict.effects.iter().map(|effect| effect.name).collect();
+    assert_eq!((verdict.verdict, names), (Kind::Named, vec!["flapping_moment"]));
+    let found = &verdict.effects[0].parameters["gain_n_m_s_per_m"];
+    let Value::Number { value, low, high } = *found else { panic!("{found:?}") };
+    assert!((low..=high).contains(&GAIN_N_M_S_PER_M), "{found:?}");
+    assert!((value / GAIN_N_M_S_PER_M - 1.0).abs() < 0.1, "{found:?}");
+}
+
+fn verdict_of(file: &VehicleFile, machine: &VehicleFile) -> Verdict {
+    let how = Flown { gyro_rad_s: 0.001, heave: 0.1, hold: 0.0, shake: [10.0, 0.1] };
+    let flights = [1, 2, 3].map(|seed| flight(machine, seed, how));
+    let verdict = diagnose(file, &flights[..2], &flights[2..], &|_| {}).unwrap().verdict;
+    println!("{}", verdict.words);
+    verdict
 }
