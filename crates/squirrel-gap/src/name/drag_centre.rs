@@ -14,6 +14,7 @@ use super::{Catalogue, Naming, Search};
 use crate::GapError;
 use crate::predictor::{DYNAMIC, Predictor};
 use squirrel_core::effects::Mimic;
+use std::cmp::Ordering;
 
 /// How far from the middle it may be along an axis, one standard deviation, over the arm.
 const SD_OF_ARM: f64 = 0.05;
@@ -72,9 +73,12 @@ impl Search<'_> {
     /// Whether an explanation with drag elsewhere is worth it beside one with drag in the middle.
     fn leads_one_in_the_middle(&self, own: &Naming, other: &Naming) -> Result<bool, GapError> {
         let (best, rival) = (&own.found.best, &other.found.best);
-        let fewer = best.members.len() < rival.members.len();
-        let as_many = best.members.len() == rival.members.len();
-        if !fewer && !(as_many && self.turns_as_drag_does(&best.members)) {
+        let may_lead = match best.members.len().cmp(&rival.members.len()) {
+            Ordering::Less => true,
+            Ordering::Equal => self.turns_as_drag_does(&best.members),
+            Ordering::Greater => false,
+        };
+        if !may_lead {
             return Ok(false);
         }
         let rival = self.score(&own.found.linear, &rival.members)?;
