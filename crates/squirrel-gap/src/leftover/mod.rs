@@ -101,6 +101,12 @@ impl Leftover {
         self.excess.first().map_or(0.0, |(_, ratio)| *ratio)
     }
 
+    /// The same of the channels from one on.
+    pub(crate) fn worst_from(&self, channel: usize) -> f64 {
+        let own = self.excess.iter().find(|(other, _)| *other >= channel);
+        own.map_or(0.0, |(_, ratio)| *ratio)
+    }
+
     /// What the leftover goes with, in words; `None` where nothing predicts it.
     pub(crate) fn goes_with(&self) -> Option<String> {
         let (channel, _) = self.excess.first()?;

@@ -58,7 +58,7 @@ pub(crate) use tolerance::{notes as silent_tolerances, sds};
 use crate::GapError;
 use crate::leftover::{Leftover, Slack, leftover, noise};
 pub(crate) use crate::predictor::TURBULENCE_M_S;
-use crate::predictor::{Hypothesis, Predictor};
+use crate::predictor::{FORCE_Z, Hypothesis, Predictor};
 use squirrel_core::effects::Timing;
 
 pub(crate) const BEHIND_NATS: f64 = 3.0;
@@ -132,8 +132,12 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let draws = noise(predictor, &wind, search.gust_m_s.unwrap_or(TURBULENCE_M_S));
     let slack = slack(search, &found);
     let judged = |left: &[f64]| leftover(predictor, &about, left, &nominal, &draws, None, slack);
+    // In gusts forces are theirs; what they hardly act on is held against an explanation.
+    let from = if search.gust_m_s.is_some() { FORCE_Z + 1 } else { 0 };
     let (left, leftover) = match (judged(&left), judged(&loose)) {
-        (as_it_is, looser) if as_it_is.worst() < looser.worst() => (left, as_it_is),
+        (as_it_is, looser) if as_it_is.worst_from(from) < looser.worst_from(from) => {
+            (left, as_it_is)
+        }
         (_, looser) => (loose, looser),
     };
     let deviations = interval::deviations(search, &found.linear, &found.best);
