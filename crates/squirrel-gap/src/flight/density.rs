@@ -5,9 +5,9 @@
 //! sigma = sqrt(P(14 .. 24 Hz) rate / 2)      P: density, median over windows and bins / ln 2
 //! ```
 //! Where the density at the end of the band is less than three quarters of that at a quarter of the
-//! rate, the log is filtered; the noise is then that just above what rotors can do, as if it were white. Medians keep
-//! lines that propellers shake, and motion of short duration, out of it (Welch, 1967; the median of
-//! an exponential distribution is its mean times ln 2).
+//! rate, the log is filtered; the noise is then that just above what rotors can do, as if it were
+//! white. Medians keep lines that propellers shake, and motion of short duration, out of it (Welch,
+//! 1967; the median of an exponential distribution is its mean times ln 2).
 
 use super::series::Series;
 use nalgebra::Vector3;
@@ -63,6 +63,11 @@ fn density(rows: &[Vector3<f64>], rate_hz: f64, band_hz: Range<f64>) -> Option<V
     let scale = 2.0 / (rate_hz * (0..length).map(|k| hann(k).powi(2)).sum::<f64>());
     let bins = (band_hz.start * WINDOW_S).ceil() as usize..=(band_hz.end * WINDOW_S) as usize;
     let every = (rows.len() / length / WINDOWS).max(1);
+    let windows: Vec<_> = rows
+        .chunks_exact(length)
+        .step_by(every)
+        .map(|window| (window, window.iter().sum::<Vector3<f64>>() / length as f64))
+        .collect();
     let mut powers: [Vec<f64>; 3] = Default::default();
     for bin in bins {
         let wave: Vec<[f64; 2]> = (0..length)
@@ -71,8 +76,7 @@ fn density(rows: &[Vector3<f64>], rate_hz: f64, band_hz: Range<f64>) -> Option<V
                 [hann(k) * cos, hann(k) * sin]
             })
             .collect();
-        for window in rows.chunks_exact(length).step_by(every) {
-            let mean = window.iter().sum::<Vector3<f64>>() / length as f64;
+        for (window, mean) in &windows {
             let (mut re, mut im) = (Vector3::zeros(), Vector3::zeros());
             for (x, [cos, sin]) in window.iter().zip(&wave) {
                 re += (x - mean) * *cos;

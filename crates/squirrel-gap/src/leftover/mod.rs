@@ -98,7 +98,7 @@ impl Leftover {
 
     /// The largest ratio to what is allowed; 0 where nothing stands out.
     pub(crate) fn worst(&self) -> f64 {
-        self.excess.first().map_or(0.0, |(_, ratio)| *ratio)
+        self.worst_from(0)
     }
 
     /// The same of the channels from one on.

@@ -97,8 +97,12 @@ fn flight(flown: &VehicleFile, seed: u64, how: Flown) -> (String, FlightLog) {
 }
 
 fn verdict(flown: &VehicleFile, how: Flown) -> Verdict {
+    verdict_of(&vehicle(FILE), flown, how)
+}
+
+fn verdict_of(file: &VehicleFile, flown: &VehicleFile, how: Flown) -> Verdict {
     let flights = [1, 2, 3].map(|seed| flight(flown, seed, how));
-    let verdict = diagnose(&vehicle(FILE), &flights[..2], &flights[2..], &|_| {}).unwrap().verdict;
+    let verdict = diagnose(file, &flights[..2], &flights[2..], &|_| {}).unwrap().verdict;
     println!("{}", verdict.words);
     verdict
 }
@@ -328,6 +332,8 @@ fn a_centre_of_mass_is_named_wherever_drag_acts() {
     }
 }
 
+const LIVELY: Flown = Flown { gyro_rad_s: 0.001, heave: 0.1, hold: 0.0, shake: [10.0, 0.1] };
+
 /// A machine on which drag acts this far above the centre of mass, as that of rotors does, and not
 /// there, as its file has it.
 fn with_drag_above(file: &VehicleFile, above_m: f64, mass: f64) -> VehicleFile {
@@ -350,7 +356,7 @@ fn with_drag_above(file: &VehicleFile, above_m: f64, mass: f64) -> VehicleFile {
 fn held_out_flights_have_drag_where_the_fitted_ones_have_it() {
     let file = vehicle_with(FILE, &[DRAG]);
     let machine = with_drag_above(&file, 0.012, 1.08);
-    let verdict = verdict_of(&file, &machine);
+    let verdict = verdict_of(&file, &machine, LIVELY);
     let names: Vec<_> = verdict.effects.iter().map(|effect| effect.name).collect();
     assert_eq!((verdict.verdict, names), (Kind::Named, vec!["mass_error"]), "{}", verdict.words);
     assert!(verdict.moved.iter().any(|moved| moved.name == "drag.centre_body_m[2]"));
@@ -364,22 +370,14 @@ fn drag_above_the_centre_of_mass_is_no_flapping() {
     const GAIN_N_M_S_PER_M: f64 = 0.004;
     let file = vehicle_with(FILE, &[DRAG]);
     let mut machine = with_drag_above(&file, 0.012, 1.0);
-    let verdict = verdict_of(&file, &machine);
+    let verdict = verdict_of(&file, &machine, LIVELY);
     assert!(verdict.effects.is_empty(), "{}", verdict.words);
     machine.effects.insert("flapping_moment").unwrap().values[0] = GAIN_N_M_S_PER_M;
-    let verdict = verdict_of(&file, &machine);
+    let verdict = verdict_of(&file, &machine, LIVELY);
     let names: Vec<_> = verdict.effects.iter().map(|effect| effect.name).collect();
     assert_eq!((verdict.verdict, names), (Kind::Named, vec!["flapping_moment"]));
     let found = &verdict.effects[0].parameters["gain_n_m_s_per_m"];
     let Value::Number { value, low, high } = *found else { panic!("{found:?}") };
     assert!((low..=high).contains(&GAIN_N_M_S_PER_M), "{found:?}");
     assert!((value / GAIN_N_M_S_PER_M - 1.0).abs() < 0.1, "{found:?}");
-}
-
-fn verdict_of(file: &VehicleFile, machine: &VehicleFile) -> Verdict {
-    let how = Flown { gyro_rad_s: 0.001, heave: 0.1, hold: 0.0, shake: [10.0, 0.1] };
-    let flights = [1, 2, 3].map(|seed| flight(machine, seed, how));
-    let verdict = diagnose(file, &flights[..2], &flights[2..], &|_| {}).unwrap().verdict;
-    println!("{}", verdict.words);
-    verdict
 }
