@@ -1,7 +1,7 @@
 //! Scale of the accelerometer: along each axis of the body it reads `f_measured = (1 + s) f`,
 //! before its bias.
 
-use super::{Declared, Effect, EffectParameter, Fitted, Mimic, Shown, Words};
+use super::{Declared, Effect, EffectParameter, Fitted, Shown, Words};
 use crate::frames::{Body, In};
 use crate::math::Real;
 use nalgebra::Vector3;
@@ -26,7 +26,6 @@ impl<T: Real> Effect<T> for AccelScale<T> {
     };
     const SHOWN: Shown = Shown::ACCELEROMETER.and(Shown::HORIZONTAL);
     const FITTED: Fitted = Fitted::Never;
-    const MIMIC: Mimic = Mimic::LeaningAttitude;
 
     #[inline(always)]
     fn accel_scale(&self) -> In<Body, T> {

@@ -102,8 +102,6 @@ pub enum Mimic {
     Nothing,
     /// Gusts, averaged over a flight: for effects of moving air.
     Gusts,
-    /// An attitude estimate that leans into accelerations.
-    LeaningAttitude,
     /// Drag that acts beside the centre of mass.
     DragElsewhere,
 }

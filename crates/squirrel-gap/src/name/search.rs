@@ -30,9 +30,6 @@ pub(super) const WEAK_ROTOR: &str = WeakRotor::<f64>::NAME;
 /// What a clock that jumps must be worth for each flight that it jumps in, which are all: by chance
 /// something changes at one of the hundreds of times at which it may.
 const JUMP_NATS: f64 = 40.0;
-/// What a scale of the accelerometer must be worth: an attitude that leans into accelerations makes
-/// one, too.
-const LEANS_NATS: f64 = 12.0;
 /// Part of its smallest size that a number without a sign has at least.
 pub(super) const LEAST: f64 = 0.02;
 /// Candidates that are refined after each linear ranking.
@@ -225,7 +222,6 @@ impl Search<'_> {
             _ if matches!(profile.response, Response::Jumps { .. }) => {
                 JUMP_NATS * self.predictor.names.len() as f64
             }
-            None if profile.mimic == Mimic::LeaningAttitude => LEANS_NATS,
             None => NATS_MIN,
             Some(sigma) if profile.mimic == Mimic::Gusts => BLOWN_NATS * (sigma * sigma).max(1.0),
             Some(_) => BESIDE_GUSTS_NATS,
